@@ -1,6 +1,6 @@
 """The law at one pressure drop as straight parts, and the dead zone that it leaves at the tests: onset, flow, drive."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import inf
 
@@ -33,6 +33,21 @@ class LawCorners:
             passed = (drive - self.offset) / (self.at_end - self.offset) if self.at_end > self.offset else 0.0
             return self.zero_band + (self.end - self.zero_band) * passed
         return self.end + (1 - self.end) * (drive - self.at_end) / (self.full - self.at_end)
+
+
+#: Shares of the largest flow at which the recorded branches are compared.
+LEVELS = tuple(level / 100 for level in range(5, 100))
+
+
+def branch_commands(test: TestResult) -> Iterator[tuple[float, float]]:
+    """Yield the commands, V, at which opening and closing branch pass a flow, level by level; of one branch none."""
+    recorded = test.recorded
+    if recorded.rising is None or recorded.falling is None:
+        return
+    for level in LEVELS:
+        up, down = (each.command_at(level * recorded.q_max_L_min) for each in (recorded.rising, recorded.falling))
+        if up is not None and down is not None:
+            yield up, down
 
 
 def corners_of(compensator: Compensator, dp_code: int, sign: int) -> LawCorners:

@@ -49,8 +49,6 @@ class LotMargin:
 
     #: Of the valve.
     name: str
-    #: Of the command, where that is least.
-    sign: int
     #: Pressure drop, where it is least.
     dp_MPa: Fraction
     #: The least distance; negative of a valve that is over-compensated.
@@ -278,7 +276,7 @@ def lot_margins(compensator: Compensator) -> tuple[LotMargin, ...]:
             places = {place for piece in side.bound().pieces for place in drive.nearest(piece)}
             margin_V, dp_MPa = min(places)
             if valve.name not in margins or margin_V < margins[valve.name].margin_V:
-                margins[valve.name] = LotMargin(name=valve.name, sign=sign, dp_MPa=dp_MPa, margin_V=margin_V)
+                margins[valve.name] = LotMargin(name=valve.name, dp_MPa=dp_MPa, margin_V=margin_V)
     return tuple(margins.values())
 
 

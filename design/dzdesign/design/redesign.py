@@ -15,8 +15,14 @@ from dzdesign.core.value_differences import differences
 from dzdesign.core.worded import errors_in
 from dzdesign.design.certificate import with_certificates
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.costs_at_tests import between_tests, corners_of, read_dead_zone, remaining_dead_zone
-from dzdesign.design.designing import LEVELS, design
+from dzdesign.design.costs_at_tests import (
+    between_tests,
+    branch_commands,
+    corners_of,
+    read_dead_zone,
+    remaining_dead_zone,
+)
+from dzdesign.design.designing import design
 from dzdesign.design.lot_setting import prove_lot
 from dzdesign.design.lot_valves import LotSide
 from dzdesign.design.options import options_of
@@ -204,14 +210,9 @@ def hysteresis_left(made: Compensator, test: TestResult, sign: int = 1) -> np.nd
         at = np.arange(len(nodes)) * functions.play_step_codes / span
         begun = np.clip((share - corners.zero_band) / (corners.end - corners.zero_band), 0, 1)
         falling = rising - np.interp(share, at, np.array(nodes) / made.signals.compare_max) * begun
-    found = []
-    for level in LEVELS:
-        flow = level * test.recorded.q_max_L_min
-        up, down = test.recorded.rising.command_at(flow), test.recorded.falling.command_at(flow)
-        drives = [each / float(made.u_max_V) for each in (up, down) if each is not None]
-        if len(drives) == 2 and drives[0] < rising[-1]:
-            opened, closed = (
-                float(np.interp(drive, branch, share)) for drive, branch in zip(drives, (rising, falling), strict=True)
-            )
-            found.append(opened - closed)
+    found, u_max = [], float(made.u_max_V)
+    for up, down in branch_commands(test):
+        if up / u_max < rising[-1]:
+            opened, closed = np.interp(up / u_max, rising, share), np.interp(down / u_max, falling, share)
+            found.append(float(opened - closed))
     return np.array(found)
