@@ -18,13 +18,15 @@ from tried_inputs import Codes, tried_inputs
 from dzdesign.codegen.project import generate
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.current.circuit import CoilCircuit, CurrentSampling, CurrentSensor
-from dzdesign.design.current.drive import CurrentRequest, design_current_drive
+from dzdesign.design.current.drive import design_current_drive
+from dzdesign.design.current.responses import CurrentRequest
 from dzdesign.design.target_inputs import Converter
 
 REQUEST = CurrentRequest(
     circuit=CoilCircuit(resistance_ohm=3.5, inductance_H=0.04, rated_A=1.0, supply_V=(18.0, 32.0)),
     sensor=CurrentSensor(V_per_A=2.0, offset_V=0.15),
     sampling=CurrentSampling(),
+    converter=Converter(),
 )
 #: Goals: with a new sample, and without.
 LIMITS = {True: 260, False: 160}
@@ -62,7 +64,7 @@ EMPTY_TICK = re.compile(r"void dz_tick\(void\)\n\{.*?\n\}\n", re.DOTALL)
 
 def with_current(compensator: Compensator) -> Compensator:
     """Return a compensator with current control of the example's coil."""
-    drive = design_current_drive(REQUEST, Converter(), compensator.signals.compare_max)
+    drive = design_current_drive(REQUEST, compensator.signals.compare_max)
     return replace(compensator, current_drive=drive)
 
 

@@ -8,8 +8,8 @@ from time import perf_counter
 from scoreboard import Row, print_rows, say
 
 from dzdesign.design.current.circuit import CoilCircuit, CurrentSampling, CurrentSensor
-from dzdesign.design.current.drive import LEAST_PHASE_DEG, choose_loop, gains_of, sensor_line, worst_step
-from dzdesign.design.current.responses import step_responses, worst_margins
+from dzdesign.design.current.drive import LEAST_PHASE_DEG, choose_loop, gains_of, worst_step
+from dzdesign.design.current.responses import CurrentRequest, step_responses, worst_margins
 from dzdesign.design.target_inputs import Converter
 from dzdesign.verify.current.coil import CoilLoop, CoilSimulation
 from dzdesign.verify.current.controller_states import check_states, hashes_on
@@ -32,11 +32,12 @@ def print_current_loop(quick: bool = False, seed: int = 0) -> list[Row]:
     rows = []
     for name, (sensor, limit_ms) in FORMS.items():
         say(f"current loop, {name} ...")
-        loop = choose_loop(COIL, sensor, CONVERTER, SAMPLING, compare_max=60000)
+        asked = CurrentRequest(circuit=COIL, sensor=sensor, sampling=SAMPLING, converter=CONVERTER)
+        loop = choose_loop(asked, 60000)
         core = current_texts(loop)
         around = CoilLoop(loop=loop, circuit=COIL, sensor=sensor, converter=CONVERTER, sampling=SAMPLING)
         phase, gain = worst_margins(COIL, SAMPLING, gains_of(loop, COIL))
-        steps = step_responses(loop, COIL, SAMPLING, sensor_line(sensor, CONVERTER))
+        steps = step_responses(loop, asked)
         slowest, largest = worst_step(steps)
         missing = LEAST_PHASE_DEG - phase.phase_deg
         rows += [

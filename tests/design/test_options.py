@@ -28,9 +28,9 @@ DUTY, AMPLIFIER = MACHINES["duty"], MACHINES["amplifier"]
 REFUSED = [
     ({"output_max": "40 %"}, "the largest output is 40.0% of full drive, but the valve opens at"),
     ({"output_max": "0.0005 %"}, "so nothing would ever flow"),
-    ({"output_max": "0 %"}, "the largest output"),
+    ({"output_max": "0 %"}, "expected more than 0, up to 100%"),
     ({"transition": "7 %"}, "choose one of 3.14 % (128 codes) at most"),
-    ({"transition": "20 %"}, "the transition is 20.000%, expected 0 to 10%"),
+    ({"transition": "20 %"}, "--transition is '20 %', expected 0 to 10%"),
     ({"transition": "0.03 %"}, "a transition of 0.030% is 1 codes of the command"),
     ({"ramp_up": "0.1 ms"}, "a ramp takes 0.0001 s, expected 0 (none), or from one sample"),
     ({"ramp_up": "1e4 s"}, "a ramp takes 10000 s"),

@@ -114,8 +114,6 @@ def test_with_a_controlled_current_the_moments_of_its_sampling_count(example_val
 def test_costs_are_compared(document):
     place, text = next((place, text) for place, text in enumerate(document["costs"]) if "offset 5." in text)
     assert f"'costs[{place}]' is" in refusal(edited(document, ("costs", place), lambda _: text.replace("5.", "4.")))
-    said = refusal(edited(document, ("costs", place), lambda _: f"{text[:-4]}other"))
-    assert "other'" in said and f"{text[-4:]}'" in said
 
 
 def test_a_file_without_its_options_is_generated_by_nobody_and_checked_by_nobody(document, tmp_path, capsys):

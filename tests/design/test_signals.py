@@ -109,17 +109,6 @@ def test_a_pressure_signal_may_not_start_below_zero(wording):
     wording("a signal: pressure below zero", str(caught.value))
 
 
-def test_sensors_too_unlike_are_refused(wording):
-    with pytest.raises(InputError) as caught:
-        Signals(
-            pressure_a=sensor("0..3 V = 1 MPa"),
-            pressure_b=sensor("4..20 mA on 150 ohm = 60 MPa"),
-            swapped=True,
-            command=command("-10..10 V x 0.15 + 1.5 V"),
-        )
-    wording("a signal: sensors too unlike", str(caught.value))
-
-
 def test_a_current_of_both_signs_has_its_zero_between():
     both = command("4..20 mA on 150 ohm = -10..10 V")
     # 12 mA on 150 ohm are 1.8 V of 3 V: 2457.6 codes.

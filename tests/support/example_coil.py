@@ -6,7 +6,8 @@ from functools import cache
 from dzdesign.codegen.target import Target
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.current.circuit import CoilCircuit, CurrentLoop, CurrentSampling, CurrentSensor
-from dzdesign.design.current.drive import CurrentRequest, choose_loop, design_current_drive
+from dzdesign.design.current.drive import choose_loop, design_current_drive
+from dzdesign.design.current.responses import CurrentRequest
 from dzdesign.design.target_inputs import Converter
 
 COIL = CoilCircuit(resistance_ohm=3.5, inductance_H=0.04, rated_A=1.0, supply_V=(18.0, 32.0))
@@ -18,16 +19,21 @@ SENSORS = {
 }
 
 
+def asked(sensor: CurrentSensor, circuit: CoilCircuit = COIL) -> CurrentRequest:
+    """Return what is asked for a coil and a sensor."""
+    return CurrentRequest(circuit=circuit, sensor=sensor, sampling=SAMPLING, converter=CONVERTER)
+
+
 @cache
 def example_loop(name: str) -> CurrentLoop:
     """Return the loop that `design` chooses."""
-    return choose_loop(COIL, SENSORS[name], CONVERTER, SAMPLING, compare_max=60000)
+    return choose_loop(asked(SENSORS[name]), 60000)
 
 
 def with_current(compensator: Compensator, target: Target, sensor: CurrentSensor) -> Compensator:
     """Return a compensator that controls the current of this coil on a target."""
-    request = CurrentRequest(circuit=COIL, sensor=sensor, sampling=target.current_sampling)
-    return replace(compensator, current_drive=_drive(request, target.converter, compensator.signals.compare_max))
+    request = replace(asked(sensor), sampling=target.current_sampling, converter=target.converter)
+    return replace(compensator, current_drive=_drive(request, compensator.signals.compare_max))
 
 
 _drive = cache(design_current_drive)

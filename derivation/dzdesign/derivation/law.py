@@ -1,8 +1,7 @@
 """What a compensation law is, and the one of a name; each is stated once, in a file of `laws/`."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cache
 from importlib import import_module
 from typing import Any
 
@@ -11,13 +10,13 @@ from sympy.core.relational import Relational
 from sympy.logic.boolalg import BooleanTrue
 
 from dzdesign.core.errors import InputError, nearest
+from dzdesign.derivation import symbols as s
 from dzdesign.derivation.account.scope import under_law
 from dzdesign.derivation.account.statement import Kind, Statement
 from dzdesign.derivation.laws import LAW_NAMES
 from dzdesign.derivation.lowering import lower
-from dzdesign.derivation.symbols import beta, dP, dP1, k, kappa, u_i, u_max, u_min0, u_O, x_max
 
-_LAW_SYMBOLS = {u_i, beta, k, x_max, u_max, u_min0}
+_LAW_SYMBOLS = {s.u_i, s.beta, s.k, s.x_max, s.u_max, s.u_min0}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)  # compared and hashed as the one object that it is
@@ -50,8 +49,8 @@ class Law:
         for complaint in self._complaints():
             raise ValueError(f"law {self.name}: {complaint}")
         if not self.statements:
-            stated = Kind.CHOICE(self.name, f"the law `{self.name}`").says(u_O, self.output)
-            stated = stated.within(under_law(self.name), sympy.Eq(dP, dP1)).remark(self.note)
+            stated = Kind.CHOICE(self.name, f"the law `{self.name}`").says(s.u_O, self.output)
+            stated = stated.within(under_law(self.name), sympy.Eq(s.dP, s.dP1)).remark(self.note)
             object.__setattr__(self, "statements", (stated,))
         object.__setattr__(self, "stated_as", self.stated_as or self.statements[-1].number)
 
@@ -59,9 +58,9 @@ class Law:
         foreign = self.output.free_symbols - _LAW_SYMBOLS
         if foreign:
             yield f"the output may not name {sorted(map(str, foreign))}"
-        if self.gain.has(u_i) or sympy.diff(self.gain, beta, 2) != 0:
+        if self.gain.has(s.u_i) or sympy.diff(self.gain, s.beta, 2) != 0:
             yield f"the output is not affine in u_i and beta: {self.output}"
-        if sympy.expand(self.offset - beta * u_min0) != 0:
+        if sympy.expand(self.offset - s.beta * s.u_min0) != 0:
             yield f"at zero command the output is {self.offset}, expected beta*u_min0"
         margin = sympy.S.One if self.rises_if == sympy.true else self.rises_if.gts - self.rises_if.lts
         if not sympy.cancel(self.gain / margin).is_positive:
@@ -70,16 +69,16 @@ class Law:
     @property
     def gain(self) -> sympy.Expr:
         """Coefficient of u_i in the output, dimensionless."""
-        return sympy.diff(self.output, u_i)
+        return sympy.diff(self.output, s.u_i)
 
     @property
     def offset(self) -> sympy.Expr:
         """Output at zero command [V]."""
-        return self.output.subs(u_i, 0)
+        return self.output.subs(s.u_i, 0)
 
     def gain_by_beta(self, power: int) -> sympy.Expr:
         """Return the part of the gain that beta does not touch (0), or what beta multiplies in it (1)."""
-        return sympy.expand(self.gain).coeff(beta, power)
+        return sympy.expand(self.gain).coeff(s.beta, power)
 
     def evaluate_gain(self, beta: Any, kappa: Any) -> Any:
         """Return the gain for numbers of any kind: fractions stay exact, arrays and CasADi expressions what they are.
@@ -92,7 +91,7 @@ class Law:
         >>> law("paper").evaluate_gain(Fraction(9, 10), Fraction(1, 2))
         Fraction(11, 20)
         """
-        return _compiled_gain(self)(beta, kappa)
+        return lower(self.gain.subs(s.k, s.kappa * s.u_max / s.x_max), (s.beta, s.kappa))(beta, kappa)
 
     def evaluate_offset(self, beta: Any, u_min0: Any) -> Any:
         """Return the output at zero command for numbers of any kind, in the unit of `u_min0`, V or any unit of command.
@@ -105,17 +104,7 @@ class Law:
         >>> law("paper").evaluate_offset(Fraction(9, 10), 5)
         Fraction(9, 2)
         """
-        return _compiled_offset(self)(beta, u_min0)
-
-
-@cache
-def _compiled_gain(law: Law) -> Callable[..., Any]:
-    return lower(law.gain.subs(k, kappa * u_max / x_max), (beta, kappa))
-
-
-@cache
-def _compiled_offset(law: Law) -> Callable[..., Any]:
-    return lower(law.offset, (beta, u_min0))
+        return lower(self.offset, (s.beta, s.u_min0))(beta, u_min0)
 
 
 def law(name: str) -> Law:

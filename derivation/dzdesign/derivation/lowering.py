@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from fractions import Fraction
+from functools import cache
 from typing import Any
 
 import sympy
@@ -15,6 +16,8 @@ def lower(
     functions: Mapping[str, Callable[[Any], Any]] | None = None,
 ) -> Callable[..., Any]:
     """Return the function that computes an expression by bare arithmetic; its arguments decide in what numbers.
+
+    It is made once: whoever lowers the same again gets the same.
 
     Parameters
     ----------
@@ -43,16 +46,27 @@ def lower(
     >>> lower(a / b, (a, b))(1, 3)
     Fraction(1, 3)
     """
-    functions = dict(functions or {})
     one = isinstance(expression, sympy.Expr)
-    expressions = (expression,) if one else tuple(expression)
+    return _lowered(
+        (expression,) if one else tuple(expression), tuple(arguments), tuple((functions or {}).items()), one
+    )
+
+
+@cache
+def _lowered(
+    expressions: tuple[sympy.Expr, ...],
+    arguments: tuple[sympy.Symbol, ...],
+    implemented: tuple[tuple[str, Callable[[Any], Any]], ...],
+    one: bool,
+) -> Callable[..., Any]:
+    functions = dict(implemented)
     # Above and below a fraction bar: a coefficient 1/2 as it stands would be printed as a division of ints to a float.
     sides = [side for each in expressions for side in (_as_fraction(each) if _has_fraction(each) else (each, _ONE))]
     for each, side in zip((one for one in expressions for _ in range(2)), sides, strict=True):
         for complaint in _complaints(side, set(arguments), functions):
             raise ValueError(f"{each} can't be lowered: {complaint}")
     # No numeric module: whatever is not in `functions` would be a NameError, never silently a float.
-    compute = sympy.lambdify(tuple(arguments), sides, modules=[functions])
+    compute = sympy.lambdify(arguments, sides, modules=[functions])
 
     def lowered(*values: Any) -> Any:
         # Python divides two ints to a float.

@@ -15,32 +15,14 @@ u_O(beta_o; u) being the law of the opening threshold. In the zero band that is 
 u_t the opening law, and beyond it the law as if there were no band: full command stays full command.
 """
 
-from collections.abc import Callable
 from functools import cache
 from typing import Any, NamedTuple
 
 import sympy
 
+from dzdesign.derivation import symbols as s
 from dzdesign.derivation.law import Law
 from dzdesign.derivation.lowering import lower
-from dzdesign.derivation.symbols import (
-    beta,
-    beta_o,
-    k,
-    kappa,
-    n_adc,
-    n_full,
-    n_i,
-    n_pwm,
-    share,
-    u_i,
-    u_max,
-    u_min0,
-    u_O,
-    u_t,
-    u_z,
-    x_max,
-)
 
 mu = sympy.Symbol("mu", positive=True)  # u_min0 / u_max: dimensionless
 n_p, n_dp = sympy.symbols("n_p n_dp", integer=True)  # code of a pressure, difference of two such codes: counts
@@ -48,12 +30,14 @@ n_span = sympy.Symbol("n_span", positive=True)  # code of a sensor's full span: 
 p_span, dp = sympy.symbols("p_span dp", real=True)  # sensor's span, pressure drop: both in Pa, or both in MPa
 
 #: n_i, code of the command: Eq. (29), full command u_max being the converter's largest code n_adc.
-COMMAND_CODE = n_adc * u_i / u_max
+COMMAND_CODE = s.n_adc * s.u_i / s.u_max
 #: n_pwm, compare value of the output: stands for Eq. (32), full drive being n_full counts.
-COMPARE_VALUE = n_full * u_O / u_max
+COMPARE_VALUE = s.n_full * s.u_O / s.u_max
 #: Pressure of a code, with both sensors alike; the text below Eq. (29) subtracts two of them.
 PRESSURE = p_span * n_p / n_span
 PRESSURE_DROP = sympy.expand(PRESSURE.subs(n_p, n_p + n_dp) - PRESSURE)
+_PRESSURE_DROP_CODE = sympy.solve(sympy.Eq(dp, PRESSURE_DROP), n_dp)[0]
+_DRIVE = sympy.solve(sympy.Eq(s.n_pwm, COMPARE_VALUE), s.u_O)[0] / s.u_max
 
 
 class Line(NamedTuple):
@@ -75,10 +59,10 @@ def law_in_counts(law: Law) -> Line:
     >>> law_in_counts(law("paper")).start
     beta*mu*n_full
     """
-    command = sympy.solve(sympy.Eq(n_i, COMMAND_CODE), u_i)[0]
-    output = law.output.subs(u_i, command).subs({k: kappa * u_max / x_max, u_min0: mu * u_max})
-    compare = COMPARE_VALUE.subs(u_O, output)
-    return Line(slope=sympy.diff(compare, n_i), start=compare.subs(n_i, 0))
+    command = sympy.solve(sympy.Eq(s.n_i, COMMAND_CODE), s.u_i)[0]
+    output = law.output.subs(s.u_i, command).subs({s.k: s.kappa * s.u_max / s.x_max, s.u_min0: mu * s.u_max})
+    compare = COMPARE_VALUE.subs(s.u_O, output)
+    return Line(slope=sympy.diff(compare, s.n_i), start=compare.subs(s.n_i, 0))
 
 
 def evaluate_line(law: Law, *, beta: Any, kappa: Any, u_min0_over_u_max: Any, n_adc: Any, n_full: Any) -> Line:
@@ -95,12 +79,8 @@ def evaluate_line(law: Law, *, beta: Any, kappa: Any, u_min0_over_u_max: Any, n_
     >>> evaluate_line(law("paper"), beta=1, kappa=half, u_min0_over_u_max=half, n_adc=4095, n_full=60000)
     Line(slope=Fraction(2000, 273), start=Fraction(30000, 1))
     """
-    return Line(*_lowered_line(law_in_counts(law))(beta, kappa, u_min0_over_u_max, n_adc, n_full))
-
-
-@cache
-def _lowered_line(line: Line) -> Callable[..., Any]:
-    return lower(line, (beta, kappa, mu, n_adc, n_full))
+    in_counts = lower(law_in_counts(law), (s.beta, s.kappa, mu, s.n_adc, s.n_full))
+    return Line(*in_counts(beta, kappa, u_min0_over_u_max, n_adc, n_full))
 
 
 def drive(counts: Any, n_full: Any) -> Any:
@@ -111,13 +91,7 @@ def drive(counts: Any, n_full: Any) -> Any:
     >>> drive(15000, 60000)
     Fraction(1, 4)
     """
-    return _lowered_drive()(counts, n_full)
-
-
-@cache
-def _lowered_drive() -> Callable[..., Any]:
-    output = sympy.solve(sympy.Eq(n_pwm, COMPARE_VALUE), u_O)[0]
-    return lower(output / u_max, (n_pwm, n_full))
+    return lower(_DRIVE, (s.n_pwm, s.n_full))(counts, n_full)
 
 
 def pressure_drop(dp_code: Any, *, span: Any, code_max: Any) -> Any:
@@ -130,12 +104,7 @@ def pressure_drop(dp_code: Any, *, span: Any, code_max: Any) -> Any:
     >>> pressure_drop(819, span=20, code_max=4095)
     Fraction(4, 1)
     """
-    return _lowered_pressure_drop()(dp_code, span, code_max)
-
-
-@cache
-def _lowered_pressure_drop() -> Callable[..., Any]:
-    return lower(PRESSURE_DROP, (n_dp, p_span, n_span))
+    return lower(PRESSURE_DROP, (n_dp, p_span, n_span))(dp_code, span, code_max)
 
 
 def pressure_drop_code(pressure_drop: Any, *, span: Any, code_max: Any) -> Any:
@@ -146,22 +115,18 @@ def pressure_drop_code(pressure_drop: Any, *, span: Any, code_max: Any) -> Any:
     >>> pressure_drop_code(4, span=20, code_max=4095)
     Fraction(819, 1)
     """
-    return _lowered_pressure_drop_code()(pressure_drop, span, code_max)
-
-
-@cache
-def _lowered_pressure_drop_code() -> Callable[..., Any]:
-    return lower(sympy.solve(sympy.Eq(dp, PRESSURE_DROP), n_dp)[0], (dp, p_span, n_span))
+    return lower(_PRESSURE_DROP_CODE, (dp, p_span, n_span))(pressure_drop, span, code_max)
 
 
 # --- zero band and transition ----------------------------------------------------------------------------------
 
 #: What the transition takes from the opening law, V.
-LOWERED_BY = (beta_o - beta) * u_min0 * (1 - share)
+LOWERED_BY = (s.beta_o - s.beta) * s.u_min0 * (1 - s.share)
+_LOWERED_COUNTS = sympy.cancel(COMPARE_VALUE.subs(s.u_O, LOWERED_BY).subs(s.u_min0, mu * s.u_max))
 #: Share of the transition that a command within it has passed.
-SHARE = (u_i - u_z) / (u_t - u_z)
+SHARE = (s.u_i - s.u_z) / (s.u_t - s.u_z)
 #: The command that the opening law is given within the transition.
-LAW_COMMAND = share * u_t
+LAW_COMMAND = s.share * s.u_t
 
 
 def evaluate_share(command: Any, *, zero_band: Any, end: Any) -> Any:
@@ -174,19 +139,18 @@ def evaluate_share(command: Any, *, zero_band: Any, end: Any) -> Any:
     >>> evaluate_share(21, zero_band=19, end=51)
     Fraction(1, 16)
     """
-    return min(max(_lowered_share()(command, zero_band, end), 0), 1)
+    return min(max(lower(SHARE, (s.u_i, s.u_z, s.u_t))(command, zero_band, end), 0), 1)
 
 
-def evaluate_law_command(command: Any, *, zero_band: Any, end: Any) -> Any:
-    """Return the command that the opening law is given: 0 in the zero band, the command itself beyond the transition.
+def evaluate_law_command(share_of_transition: Any, *, end: Any) -> Any:
+    """Return the command that the opening law is given within the transition: from 0 on, at its end the command itself.
 
     Examples
     --------
-    >>> evaluate_law_command(21, zero_band=19, end=51)
+    >>> evaluate_law_command(evaluate_share(21, zero_band=19, end=51), end=51)
     Fraction(51, 16)
     """
-    passed = evaluate_share(command, zero_band=zero_band, end=end)
-    return command if passed == 1 else _lowered_command()(passed, end)
+    return lower(LAW_COMMAND, (s.share, s.u_t))(share_of_transition, end)
 
 
 def evaluate_transition(
@@ -202,20 +166,5 @@ def evaluate_transition(
     >>> evaluate_transition(beta_opening=1, beta_closing=0, u_min0_over_u_max=1, share_of_transition=0, n_full=600)
     Fraction(600, 1)
     """
-    return _lowered_fall()(beta_opening, beta_closing, u_min0_over_u_max, share_of_transition, n_full)
-
-
-@cache
-def _lowered_fall() -> Callable[..., Any]:
-    counts = COMPARE_VALUE.subs(u_O, LOWERED_BY).subs(u_min0, mu * u_max)
-    return lower(sympy.cancel(counts), (beta_o, beta, mu, share, n_full))
-
-
-@cache
-def _lowered_share() -> Callable[..., Any]:
-    return lower(SHARE, (u_i, u_z, u_t))
-
-
-@cache
-def _lowered_command() -> Callable[..., Any]:
-    return lower(LAW_COMMAND, (share, u_t))
+    lowered = lower(_LOWERED_COUNTS, (s.beta_o, s.beta, mu, s.share, s.n_full))
+    return lowered(beta_opening, beta_closing, u_min0_over_u_max, share_of_transition, n_full)

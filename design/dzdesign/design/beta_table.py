@@ -197,10 +197,6 @@ def choose_beta_table(
     best = best_nodes(limit, worth, trend, last, 2 - 2 / denominator if above_one else 1.0)
     # A thousandth of a count, so that a beta of 1 to within the solver's error stays 1.
     nodes = [max(int(np.floor(value * denominator + 1e-3)), 1) for value in best]
-    # Rounding down keeps the direction; a last node above its neighbour by the solver's error is put right.
-    for position in range(1, len(nodes)):
-        if trend != "increasing" or position > last + 1:
-            nodes[position] = min(nodes[position], nodes[position - 1])
     return _lower_until_proved(nodes, ceiling, u_min0, trend, denominator, last)
 
 
@@ -216,6 +212,7 @@ def _lower_until_proved(
             nodes[high] -= 1
             if nodes[high] <= 0:
                 raise RequirementError("no positive offset lies under the certified one; check valve.json")
+    # Lowered nodes, and one above its neighbour by the solver's error, go the table's way again.
     for position in range(last, 0, -1) if trend == "increasing" else ():
         nodes[position - 1] = min(nodes[position - 1], nodes[position])
     for position in range(last + 2 if trend == "increasing" else 1, len(nodes)):

@@ -21,38 +21,35 @@ DIGITS_V = 7
 #: Of a half-width and a price: finer than any error here.
 DIGITS = 9
 RECORDING: Component = "recording"
-#: Where what nobody declares is from.
-SOURCES: Mapping[Component, tuple[Origin, str]] = {
-    RECORDING: ("measured", "noise, meter zero, repeatability and the premise between the tests"),
-    "rounding of pressures": ("declared", "the converter's codes"),
-    "rounding of the drive": ("declared", "half a count of the PWM"),
-    "dither": ("declared", "--dither"),
-}
 
 
-class _Declared(NamedTuple):
-    """Key of `Machine` that a component is from, the option that declares it, and the unit of its half-width."""
+class _Stated(NamedTuple):
+    """What states a component: an option or what was measured, the unit of its half-width, and its key of `Machine`."""
 
-    field: str
-    option: str
+    source: str
     unit: str = "%"
+    field: str = ""
 
 
-DECLARED: Mapping[Component, _Declared] = {
-    "bench pressure drop": _Declared("bench_pressure_error_MPa", "--bench-pressure-error", "MPa"),
-    "pressure sensor A": _Declared("pressure_error_a_MPa", "--pressure-error", "MPa"),
-    "pressure sensor B": _Declared("pressure_error_b_MPa", "--pressure-error", "MPa"),
-    "pressure converter offset": _Declared("pressure_offset_codes", "--pressure-converter", "codes"),
-    "pressure converter gain": _Declared("pressure_gain_codes", "--pressure-converter", "codes"),
-    "pressure converter noise": _Declared("pressure_noise_codes", "--pressure-converter", "codes"),
-    "coil temperature": _Declared("bench_coil_C", "--coil-temperature, --bench-coil", "K"),
-    "supply": _Declared("bench_supply_V", "--supply, --bench-supply", "V"),
-    "amplifier": _Declared("amplifier_error", "--amplifier"),
-    "current": _Declared("current_error", "--current-error"),
-    "current's rest": _Declared("current_rest_error", "--current-signal"),
-    "bench current": _Declared("bench_current_error", "--bench-current"),
-    "oil": _Declared("oil_error", "--oil"),
-    "ageing": _Declared("ageing_error", "--ageing"),
+STATED: Mapping[Component, _Stated] = {
+    RECORDING: _Stated("noise, meter zero, repeatability and the premise between the tests", "mV"),
+    "rounding of pressures": _Stated("the converter's codes", "codes"),
+    "rounding of the drive": _Stated("half a count of the PWM", "counts"),
+    "dither": _Stated("--dither", "counts"),
+    "bench pressure drop": _Stated("--bench-pressure-error", "MPa", "bench_pressure_error_MPa"),
+    "pressure sensor A": _Stated("--pressure-error", "MPa", "pressure_error_a_MPa"),
+    "pressure sensor B": _Stated("--pressure-error", "MPa", "pressure_error_b_MPa"),
+    "pressure converter offset": _Stated("--pressure-converter", "codes", "pressure_offset_codes"),
+    "pressure converter gain": _Stated("--pressure-converter", "codes", "pressure_gain_codes"),
+    "pressure converter noise": _Stated("--pressure-converter", "codes", "pressure_noise_codes"),
+    "coil temperature": _Stated("--coil-temperature, --bench-coil", "K", "bench_coil_C"),
+    "supply": _Stated("--supply, --bench-supply", "V", "bench_supply_V"),
+    "amplifier": _Stated("--amplifier", field="amplifier_error"),
+    "current": _Stated("--current-error", field="current_error"),
+    "current's rest": _Stated("--current-signal", field="current_rest_error"),
+    "bench current": _Stated("--bench-current", field="bench_current_error"),
+    "oil": _Stated("--oil", field="oil_error"),
+    "ageing": _Stated("--ageing", field="ageing_error"),
 }
 #: Components whose range is declared against a value on the bench.
 RANGES = ("coil temperature", "supply")
@@ -99,15 +96,15 @@ def budget_of(
             alone = _less(certified, limits_V(allowance.only(component)))
             without = limits_V(allowance.without(component))
         contributions = [1000 * value for value in alone]
-        half_width, unit = _half_width(component, allowance, machine, contributions)
-        origin, source = SOURCES[component] if component in SOURCES else _declared(component, machine)
+        half_width = _half_width(component, allowance, machine, contributions)
+        origin, source = _of(component, machine)
         sensitivities = [value / half_width if half_width else Fraction(0) for value in contributions]
         return BudgetLine(
             component=component,
             origin=origin,
             source=source,
             half_width=round(float(half_width), DIGITS),
-            unit=unit,
+            unit=STATED[component].unit,
             sensitivity_mV=tuple(round(float(value), DIGITS_mV) for value in sensitivities),
             contribution_mV=tuple(round(float(value), DIGITS_mV) for value in contributions),
             price=round(float(max(_less(without, full_V)) / u_max_V), DIGITS),
@@ -129,29 +126,28 @@ def _less(values: Sequence[Fraction], others: Sequence[Fraction]) -> list[Fracti
 
 def _half_width(
     component: Component, allowance: Allowance, machine: Machine | None, contributions_mV: Sequence[Fraction]
-) -> tuple[Fraction, str]:
-    """Return a component's half-width and its unit; of a range its end that lowers the threshold."""
+) -> Fraction:
+    """Return a component's half-width in its unit; of a range its end that lowers the threshold."""
     if component == RECORDING:
-        return max(contributions_mV), "mV"
+        return max(contributions_mV)
     if component == "rounding of pressures":
         low, high = allowance.signals.difference_error(allowance.sign)
-        return Fraction(max(-low, high)), "codes"
+        return Fraction(max(-low, high))
     if component in ("rounding of the drive", "dither"):
-        return allowance.shares[component] * allowance.signals.compare_max, "counts"
-    field, _, unit = DECLARED[component]
-    declared = Fraction(repr(getattr(machine, field) or 0.0))
+        return allowance.shares[component] * allowance.signals.compare_max
+    declared = Fraction(repr(getattr(machine, STATED[component].field) or 0.0))
     if machine is not None and component == "coil temperature":
-        return declared - min(declared, *map(Fraction, map(repr, machine.coil_temperature_C or ()))), unit
+        return declared - min(declared, *map(Fraction, map(repr, machine.coil_temperature_C or ())))
     if machine is not None and component == "supply":
-        return max(declared, *map(Fraction, map(repr, machine.supply_V or ()))) - declared, unit
-    return 100 * declared if unit == "%" else declared, unit
+        return max(declared, *map(Fraction, map(repr, machine.supply_V or ()))) - declared
+    return 100 * declared if STATED[component].unit == "%" else declared
 
 
-def _declared(component: Component, machine: Machine | None) -> tuple[Origin, str]:
-    """Return whether a component of the machine was declared, and by which option, or whose default it took."""
-    field, option, _ = DECLARED[component]
+def _of(component: Component, machine: Machine | None) -> tuple[Origin, str]:
+    """Return whether a component was measured or declared, and by what, or whose default it took."""
+    source, _, field = STATED[component]
     if machine is None or field not in machine.defaults:
-        return "declared", option
+        return "measured" if component == RECORDING else "declared", source
     if component in RANGES:  # the range was declared, but what it is counted from was not
-        return "default", f"{machine.defaults[field]}; the range by {option.partition(',')[0]}"
+        return "default", f"{machine.defaults[field]}; the range by {source.partition(',')[0]}"
     return "default", machine.defaults[field]

@@ -1,6 +1,6 @@
 """The certified offset over the pressure drop, exactly from valve.json; at every code; and what may be put out of it.
 
-At consecutive codes a curve is a polynomial on each stretch between its nodes: whole numbers over one denominator.
+At consecutive codes a curve is a polynomial on each span between its nodes: whole numbers over one denominator.
 
 Above the highest tested pressure drop the offset is held, lowered with the continued bound, or released. Released means
 a beta of one unit: the compensation ends, and the command drives the valve on. A drive of zero would shut a valve that
@@ -11,10 +11,11 @@ nothing else.
 from bisect import bisect_left
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
-from itertools import accumulate
+from itertools import accumulate, pairwise
 from math import ceil, floor, lcm
+from typing import NamedTuple
 
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.worded import worded
@@ -128,12 +129,13 @@ class OffsetCurve:
         """
         if self.above is not None and dp_MPa > self.dp_MPa[-1]:
             return self.above.at(dp_MPa)
-        value = self._straight(dp_MPa)
+        value = self.straight(dp_MPa)
         if self.hold_below_MPa is not None and dp_MPa <= self.hold_below_MPa:
-            value = min(value, self._straight(self.hold_below_MPa))
+            value = min(value, self.straight(self.hold_below_MPa))
         return value
 
-    def _straight(self, dp_MPa: Fraction) -> Fraction:
+    def straight(self, dp_MPa: Fraction) -> Fraction:
+        """Return the line through the nodes, V, whatever is held below dP0; outside them the nearest one's offset."""
         nodes, offset = self.dp_MPa, self.offset_V
         if dp_MPa >= nodes[-1]:
             return offset[-1]
@@ -175,14 +177,15 @@ Polynomial = tuple[Fraction, Fraction, Fraction]
 KNOWN: deque[tuple[OffsetCurve, Signals, int, int, ExactRow]] = deque(maxlen=8)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Stretch:
-    """A curve between two neighbouring corners, in MPa and V: the offset is the least of some polynomials."""
+class _Span(NamedTuple):
+    """A curve from the end of the span before up to its own: a polynomial in MPa, V."""
 
-    offset: tuple[Polynomial, ...]
-    #: Neither offset nor bound falls below zero: above the tests.
-    never_below_zero: bool
-    bound: Polynomial | None
+    #: Pressure drop up to which it goes, itself included; None: all others.
+    to_MPa: Fraction | None
+    polynomial: Polynomial
+    #: What it is at most, and at least.
+    most_V: Fraction | None = None
+    least_V: Fraction | None = None
 
 
 def certified_row(curve: OffsetCurve, signals: Signals, first: int, last: int) -> ExactRow:
@@ -190,89 +193,67 @@ def certified_row(curve: OffsetCurve, signals: Signals, first: int, last: int) -
     for known, of_signals, begin, end, row in tuple(KNOWN):
         if (begin, end) == (first, last) and (known is curve or known == curve) and of_signals == signals:
             return row
-    row = _row(curve, signals, first, last)
+    row = _held_under(curve, offset_row(curve, signals, first, last), signals.dp_MPa(1), first)
     KNOWN.append((curve, signals, first, last, row))
     return row
 
 
-def _row(curve: OffsetCurve, signals: Signals, first: int, last: int) -> ExactRow:
-    step, parts = signals.dp_MPa(1), []
-    for begin, end, stretch in _stretches(curve, step, first, last):
-        part = None if stretch is None else _least(stretch, step, begin, end)
-        if part is None:  # a corner, or refused
-            values = [certified_V(curve, code * step) for code in range(begin, end)]
-            parts += [([value.numerator], value.denominator) for value in values]
-        else:
-            parts.append(part)
-    return ExactRow.joined(parts)
+def _held_under(curve: OffsetCurve, offset: ExactRow, step: Fraction, first: int) -> ExactRow:
+    """Return the least of an offset from the code `first` on and of the bounds; one above its bound is refused."""
+    numerators, denominators = list(offset.numerators), list(offset.denominators)
+    for begin, end, span in _bounds(curve, step, first, first + len(offset)):
+        values, unit = _values(span, step, range(begin, end))
+        slack = int(DECIMALS * unit)
+        for place, value in enumerate(values, begin - first):
+            own, bound = numerators[place] * unit, value * denominators[place]
+            if own > bound + slack * denominators[place]:
+                certified_V(curve, (first + place) * step)  # says so
+            if bound < own:
+                numerators[place], denominators[place] = value, unit
+    return ExactRow(tuple(numerators), tuple(denominators))
+
+
+def _bounds(curve: OffsetCurve, step: Fraction, first: int, end: int) -> Iterator[tuple[int, int, _Span]]:
+    """Yield the codes, from and up to, of each piece of the bounds, and its span: where two meet, both count."""
+    tests = curve.certified.pieces if curve.certified else ()
+    above = curve.above.bound.pieces if curve.above and curve.above.certified else ()
+    after = floor(curve.dp_MPa[-1] / step) + 1  # the last test has its own bound
+    for piece, begin, least_V in [*((each, first, None) for each in tests), *((each, after, NONE) for each in above)]:
+        codes = max(ceil(piece.from_MPa / step), begin, first), min(floor(piece.to_MPa / step) + 1, end)
+        yield *codes, _Span(None, _of_piece(piece), least_V=least_V)
 
 
 def offset_row(curve: OffsetCurve, signals: Signals, first: int, last: int) -> ExactRow:
     """Return the offset at each of the codes, V, whatever is certified."""
-    above = curve.above and replace(curve.above, certified=False)
-    return _row(replace(curve, certified=None, above=above), signals, first, last)
+    step, parts, begin = signals.dp_MPa(1), [], first
+    for span in _spans(curve):
+        end = last + 1 if span.to_MPa is None else min(max(floor(span.to_MPa / step), begin - 1), last) + 1
+        parts.append(_values(span, step, range(begin, end)))
+        begin = end
+    return ExactRow.joined(parts)
 
 
-def _stretches(
-    curve: OffsetCurve, step: Fraction, first: int, last: int
-) -> Iterator[tuple[int, int, _Stretch | None]]:
-    """Yield the codes, from and up to, of each corner that has one, and of each stretch between two corners."""
-    corners, begin = _corners(curve), first
-    for index, corner in enumerate([*corners, None]):
-        place = None if corner is None else corner / step
-        end = last + 1 if place is None else min(max(ceil(place), begin), last + 1)
-        if end > begin:
-            low = corners[index - 1] if index else None
-            yield begin, end, _stretch(curve, low, corner)
-            begin = end
-        if place is not None and place == begin <= last:
-            yield begin, begin + 1, None
-            begin += 1
-
-
-def _corners(curve: OffsetCurve) -> list[Fraction]:
-    """Return the pressure drops between which the curve is one polynomial, or the least of some, MPa."""
-    corners = set(curve.dp_MPa)
-    if curve.hold_below_MPa is not None:
-        corners.add(curve.hold_below_MPa)
-    pieces = list(curve.certified.pieces) if curve.certified else []
-    if curve.above is not None:
-        pieces += curve.above.bound.pieces
-        corners |= {deepest_MPa(piece) for piece in curve.above.bound.pieces if piece.curvature > 0}
-    return sorted(corners | {end for piece in pieces for end in (piece.from_MPa, piece.to_MPa)})
-
-
-def _stretch(curve: OffsetCurve, low_MPa: Fraction | None, high_MPa: Fraction | None) -> _Stretch:
-    """Return the curve between two neighbouring corners; None is beyond all of them."""
-    if low_MPa is None:
-        inside = (high_MPa or NONE) - 1
-    else:
-        inside = low_MPa + 1 if high_MPa is None else (low_MPa + high_MPa) / 2
-    if curve.above is not None and inside > curve.dp_MPa[-1]:
-        return _stretch_above(curve, inside)
-    offset = [_straight(curve, inside)]
-    if curve.hold_below_MPa is not None and inside <= curve.hold_below_MPa:
-        offset.append(_constant(curve.at(curve.hold_below_MPa)))
-    bounding = list(curve.certified.touching(inside, inside)) if curve.certified else []
-    bound = _of_piece(bounding[0]) if bounding else None
-    return _Stretch(offset=tuple(offset), never_below_zero=False, bound=bound)
-
-
-def _stretch_above(curve: OffsetCurve, inside_MPa: Fraction) -> _Stretch:
-    above = curve.above
-    if above is None or inside_MPa > above.bound.pieces[-1].to_MPa:
-        return _Stretch(offset=(_constant(NONE),), never_below_zero=True, bound=None)
-    place = bisect_left(above.bound.pieces, inside_MPa, key=lambda piece: piece.to_MPa)
-    piece = above.bound.pieces[place]
-    passed = [above.least_V[place], piece.at(piece.from_MPa)]
-    if piece.curvature > 0 and piece.from_MPa < (deepest := deepest_MPa(piece)) < inside_MPa:
-        passed.append(piece.at(deepest))
-    polynomial = _of_piece(piece)
-    return _Stretch(
-        offset=(polynomial, _constant(min(passed))),
-        never_below_zero=True,
-        bound=polynomial if above.certified else None,
-    )
+def _spans(curve: OffsetCurve) -> Iterator[_Span]:
+    """Yield the offset from below the first node to beyond all bounds."""
+    nodes, hold = curve.dp_MPa, curve.hold_below_MPa
+    held = None if hold is None else curve.at(hold)
+    inside = (hold,) if hold is not None and nodes[0] < hold < nodes[-1] else ()
+    ends = sorted({*nodes, *inside})
+    yield _Span(ends[0], (curve.offset_V[0], NONE, NONE), held)
+    for left, right in pairwise(ends):
+        low, high = curve.straight(left), curve.straight(right)
+        slope = (high - low) / (right - left)
+        yield _Span(right, (high - slope * right, slope, NONE), held if hold is not None and right <= hold else None)
+    if curve.above is None:
+        yield _Span(None, (curve.offset_V[-1], NONE, NONE))
+        return
+    for passed_V, piece in zip(curve.above.least_V, curve.above.bound.pieces, strict=False):
+        most_V = min(passed_V, piece.low_V)
+        if piece.curvature > 0 and piece.from_MPa < (deepest := deepest_MPa(piece)) < piece.to_MPa:
+            yield _Span(deepest, _of_piece(piece), most_V, NONE)
+            most_V = min(most_V, piece.at(deepest))
+        yield _Span(piece.to_MPa, _of_piece(piece), most_V, NONE)
+    yield _Span(None, (NONE, NONE, NONE))
 
 
 def deepest_MPa(piece: BoundPiece) -> Fraction:
@@ -281,49 +262,45 @@ def deepest_MPa(piece: BoundPiece) -> Fraction:
     return (piece.from_MPa + piece.to_MPa) / 2 - slope / piece.curvature
 
 
-def _constant(value: Fraction) -> Polynomial:
-    return value, NONE, NONE
-
-
-def _straight(curve: OffsetCurve, inside_MPa: Fraction) -> Polynomial:
-    """Return the line between the two nodes about a pressure drop; outside all nodes the nearest one's offset."""
-    nodes, offset = curve.dp_MPa, curve.offset_V
-    if inside_MPa <= nodes[0] or inside_MPa >= nodes[-1]:
-        return _constant(offset[0] if inside_MPa <= nodes[0] else offset[-1])
-    right = next(place for place, node in enumerate(nodes) if node > inside_MPa)
-    slope = (offset[right] - offset[right - 1]) / (nodes[right] - nodes[right - 1])
-    return offset[right] - slope * nodes[right], slope, NONE
-
-
 def _of_piece(piece: BoundPiece) -> Polynomial:
     """Return the chord less its sag: M/2 (x - from) (to - x)."""
+    if piece.from_MPa == piece.to_MPa:
+        return piece.low_V, NONE, NONE
     slope, sag = (piece.high_V - piece.low_V) / (piece.to_MPa - piece.from_MPa), piece.curvature / 2
     at_zero = piece.low_V - slope * piece.from_MPa + sag * piece.from_MPa * piece.to_MPa
     return at_zero, slope - sag * (piece.from_MPa + piece.to_MPa), sag
 
 
-def _least(stretch: _Stretch, step: Fraction, begin: int, end: int) -> tuple[list[int], int] | None:
-    """Return the least of offset and bound at the codes from `begin` up to `end`, V; None where the bound is broken."""
-    wanted = dict.fromkeys((*stretch.offset, *((stretch.bound,) if stretch.bound else ())))
-    in_codes = {each: (each[0], each[1] * step, each[2] * step * step) for each in wanted}
-    unit = lcm(DECIMALS.denominator, *(part.denominator for parts in in_codes.values() for part in parts))
-    codes, values = range(begin, end), {}
-    for each, parts in in_codes.items():
-        none, one, two = (part.numerator * (unit // part.denominator) for part in parts)
-        if two:
-            found = [none + code * (one + code * two) for code in codes]
-        else:
-            found = [none + code * one for code in codes] if one else [none] * len(codes)
-        values[each] = [max(value, 0) for value in found] if stretch.never_below_zero else found
-    offset = values[stretch.offset[0]]
-    for other in stretch.offset[1:]:
-        offset = list(map(min, offset, values[other]))
-    if stretch.bound is None or stretch.bound in stretch.offset:  # of which the offset is the least
-        return offset, unit
-    bound, slack = values[stretch.bound], int(DECIMALS * unit)
-    if any(value > limit + slack for value, limit in zip(offset, bound, strict=True)):
-        return None
-    return list(map(min, offset, bound)), unit
+def lowest_places(piece: BoundPiece) -> Iterator[Fraction]:
+    """Yield where a piece of the bound may be lowest, MPa: its ends, and where its sag is deepest if that is inside."""
+    yield piece.from_MPa
+    yield piece.to_MPa
+    if piece.curvature > 0 and piece.from_MPa < (deepest := deepest_MPa(piece)) < piece.to_MPa:
+        yield deepest
+
+
+def at_codes(piece: BoundPiece, step: Fraction, codes: range) -> tuple[list[int], int]:
+    """Return a piece of a bound at codes, V: whole numbers over one denominator."""
+    return _values(_Span(None, _of_piece(piece)), step, codes)
+
+
+def _values(span: _Span, step: Fraction, codes: range) -> tuple[list[int], int]:
+    """Return a span at codes, V: whole numbers over one denominator."""
+    parts = [part * step**power for power, part in enumerate(span.polynomial)]
+    limits = [limit for limit in (span.most_V, span.least_V) if limit is not None]
+    unit = lcm(DECIMALS.denominator, *(part.denominator for part in (*parts, *limits)))
+    none, one, two = (int(part * unit) for part in parts)
+    if two:
+        found = [none + code * (one + code * two) for code in codes]
+    else:
+        found = [none + code * one for code in codes] if one else [none] * len(codes)
+    if span.most_V is not None:
+        most = int(span.most_V * unit)
+        found = [min(value, most) for value in found]
+    if span.least_V is not None:
+        least = int(span.least_V * unit)
+        found = [max(value, least) for value in found]
+    return found, unit
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,10 +1,10 @@
 """The certificate: proof that the offset lies below the lower bound of the guarded threshold at every pressure code.
 
-`design` proves it for the table that it chooses, and `codegen` and `verify` prove it again for a compensator that comes
-from a file: a file can be edited, and the firmware's header would go on promising what no longer holds.
+`design` proves it for the table that it chooses, and so it is proved again where a compensator from a file is designed
+again: a file can be edited, and the firmware's header would go on promising what no longer holds.
 """
 
-from dataclasses import fields
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import ceil
 
@@ -12,14 +12,14 @@ import numpy as np
 
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.recorded_units import RecordedUnits
-from dzdesign.core.worded import in_units
 from dzdesign.design.beta_table import STEP_CODES, TableMargins
 from dzdesign.design.budget import budget_of
 from dzdesign.design.ceiling import OffsetCeiling, OffsetCurve, offset_above, offset_ceiling, offset_row
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.design_choices import Above
-from dzdesign.design.machine import Machine
-from dzdesign.design.side_law import Budget, Certificate
+from dzdesign.design.machine import Allowance, Machine
+from dzdesign.design.options import DesignOptions
+from dzdesign.design.side_law import Budget, Certificate, Sides
 from dzdesign.design.signals import SIDE_NAMES, Signals
 from dzdesign.identify.valve.guard_curve import CertifiedCurve, Guard
 from dzdesign.identify.valve.side_model import SideModel
@@ -28,90 +28,68 @@ from dzdesign.identify.valve.side_model import SideModel
 LOSS_DIGITS = 7
 
 
-def certify(
-    side: SideModel,
-    curve: OffsetCurve,
-    ceiling: OffsetCeiling,
-    *,
-    guard: Guard,
-    signals: Signals,
-    u_max_V: Fraction,
-    u_min0: Fraction,
-    table: tuple[int, ...],
-    denominator: int,
-) -> Certificate:
-    """Prove the certificate of one side, in exact arithmetic, at every pressure code.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GuardedSide:
+    """One side of a valve, the threshold of it that is guarded, and what rounding, dither and the machine leave."""
 
-    The `curve` is the guarded one; the `ceiling` is what rounding, dither and the machine leave of it. The
-    table is of nodes of beta over `denominator`, `u_min0` is the law's over u_max. An offset above the ceiling is
-    refused.
-    """
-    margins = TableMargins(limit=ceiling.limit, nodes=table, unit=u_min0 / (denominator * STEP_CODES))
-    margin = _smallest_margin(margins, ceiling.certified, lets_go=curve.above is not None)
-    losses = _losses_V(curve, ceiling.certified, signals, margins, u_max_V)
-    holds_to, released_from = _above(curve, ceiling.certified, signals, margins)
-    return Certificate(
-        confidence=side.certificate.confidence,
-        guard=guard,
-        level_L_min=side.unseen_below_L_min(guard),
-        zero_flow_L_min=side.zero_flow_L_min,
-        dp_MPa=(curve.dp_MPa[0], curve.dp_MPa[-1]),
-        holds_to_MPa=holds_to,
-        released_from_MPa=released_from,
-        smallest_margin_V=margin * u_max_V,
-        mean_loss_V=round(sum(losses) / len(losses), LOSS_DIGITS),
-        largest_loss_V=round(max(losses), LOSS_DIGITS),
-    )
+    side: SideModel
+    guard: Guard
+    #: Certified offset of the guarded threshold.
+    curve: OffsetCurve
+    #: What rounding, dither and the machine leave of it.
+    ceiling: OffsetCeiling
+    allowance: Allowance
+    u_max_V: Fraction
+    machine: Machine | None
 
+    @classmethod
+    def of(
+        cls, side: SideModel, guard: Guard, chosen: DesignOptions | Compensator, u_max_V: Fraction, allowance: Allowance
+    ) -> "GuardedSide":
+        """Return it with its curve and its ceiling."""
+        curve = guarded_curve(side, guard, chosen.below_dp0, chosen.above, chosen.machine)
+        return cls(
+            side=side, guard=guard, curve=curve, ceiling=offset_ceiling(curve, u_max_V, allowance),
+            allowance=allowance, u_max_V=u_max_V, machine=chosen.machine,
+        )  # fmt: skip
 
-def certified(compensator: Compensator, side: SideModel, sign: int) -> tuple[Certificate, Budget]:
-    """Return certificate and budget of a compensator's law of a sign for a side of a valve, proved."""
-    law, guard = compensator.side(sign), compensator.side(sign).certificate.guard
-    curve = guarded_curve(side, guard, compensator.below_dp0, compensator.above, compensator.machine)
-    allowance = compensator.allowance(sign)
-    certificate = certify(
-        side,
-        curve,
-        offset_ceiling(curve, compensator.u_max_V, allowance),
-        guard=guard,
-        signals=compensator.signals,
-        u_max_V=compensator.u_max_V,
-        u_min0=law.u_min0_over_u_max,
-        table=law.beta,
-        denominator=compensator.beta_denominator,
-    )
-    return certificate, budget_of(side, curve, compensator.u_max_V, allowance, guard, compensator.machine)
+    def certify(self, u_min0: Fraction, table: tuple[int, ...], denominator: int) -> tuple[Certificate, Budget]:
+        """Prove the certificate, in exact arithmetic, at every pressure code; return it with the budget.
+
+        The table is of nodes of beta over `denominator`, `u_min0` is the law's over u_max. An offset above the ceiling
+        is refused.
+        """
+        signals, curve, tested = self.allowance.signals, self.curve, self.ceiling.certified
+        margins = TableMargins(limit=self.ceiling.limit, nodes=table, unit=u_min0 / (denominator * STEP_CODES))
+        margin = _smallest_margin(margins, tested, lets_go=curve.above is not None)
+        losses = _losses_V(curve, tested, signals, margins, self.u_max_V)
+        holds_to, released_from = _above(curve, tested, signals, margins)
+        certificate = Certificate(
+            confidence=self.side.certificate.confidence,
+            guard=self.guard,
+            level_L_min=self.side.unseen_below_L_min(self.guard),
+            zero_flow_L_min=self.side.zero_flow_L_min,
+            dp_MPa=(curve.dp_MPa[0], curve.dp_MPa[-1]),
+            holds_to_MPa=holds_to,
+            released_from_MPa=released_from,
+            smallest_margin_V=margin * self.u_max_V,
+            mean_loss_V=round(sum(losses) / len(losses), LOSS_DIGITS),
+            largest_loss_V=round(max(losses), LOSS_DIGITS),
+        )
+        return certificate, budget_of(self.side, curve, self.u_max_V, self.allowance, self.guard, self.machine)
 
 
-def prove_certificates(compensator: Compensator) -> None:
-    """Prove the certificates of a compensator again, from the valve in it; refuse the first statement that differs."""
+def with_certificates(compensator: Compensator) -> Compensator:
+    """Return a compensator whose certificates and budgets are those that follow from the valve in it."""
+    laws = {}
     for sign in compensator.signals.signs:
-        name = SIDE_NAMES[sign]
-        law, model = compensator.side(sign), compensator.valve.sides.get(name)
-        if model is None:
-            raise InputError(f"the compensator drives the {name} side, but its valve has none; design it again")
-        try:
-            proved, budget = certified(compensator, model, sign)
-        except RequirementError as error:
-            reason = in_units(error, compensator.valve.recorded_units)
-            raise InputError(f"the {name} side's certificate does not hold: {reason}; design it again") from error
-        for field in fields(Certificate):
-            claim, found = getattr(law.certificate, field.name), getattr(proved, field.name)
-            if claim != found:
-                raise InputError(
-                    f"the {name} side's certificate says {field.name} = {_words(claim)}, but {_words(found)} follows "
-                    "from its valve; design it again"
-                )
-        if law.budget != budget:
-            raise InputError(
-                f"the {name} side's budget is not the one that follows from its valve and its machine; design it again"
-            )
-
-
-def _words(value: object) -> str:
-    if isinstance(value, tuple):
-        return " to ".join(map(_words, value))
-    return f"{float(value):.6g}" if isinstance(value, Fraction) else str(value)
+        law, side = compensator.side(sign), compensator.valve.sides[SIDE_NAMES[sign]]
+        guarded = GuardedSide.of(
+            side, law.certificate.guard, compensator, compensator.u_max_V, compensator.allowance(sign)
+        )
+        certificate, budget = guarded.certify(law.u_min0_over_u_max, law.beta, compensator.beta_denominator)
+        laws[sign] = replace(law, certificate=certificate, budget=budget)
+    return replace(compensator, sides=Sides(positive=laws[1], negative=laws.get(-1)))
 
 
 def guarded_curve(

@@ -4,12 +4,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import lru_cache
-from threading import local
 from typing import Annotated, ClassVar, Literal
 
 from msgspec import Meta
 
-from dzdesign.core.artefact_types import Artefact, RuleError, as_document, quantity, schema_of, to_json_bytes
+from dzdesign.core.artefact_types import Artefact, RuleError, as_document, quantity, schema_of
 from dzdesign.core.documents import sha256_of, to_json
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.result_display import ShownInNotebooks
@@ -31,17 +30,6 @@ from dzdesign.design.side_law import SideLaw, Sides
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import CommandError, TargetInputs
 from dzdesign.identify.valve.model import ValveModel
-
-#: The last valve and its hash: a design makes several compensators of one valve, each of which states the hash.
-LAST = local()
-
-
-def sha256_of_valve(valve: ValveModel) -> str:
-    """Return the SHA-256 of the valve.json of a valve; known again by its identity, for a valve never changes."""
-    if getattr(LAST, "valve", None) is not valve:
-        LAST.sha256, LAST.valve = sha256_of(to_json_bytes(valve)), valve
-    digest: str = LAST.sha256
-    return digest
 
 
 @lru_cache(maxsize=64)
@@ -248,15 +236,15 @@ class Compensator(ShownInNotebooks, Artefact):
 
         if from_zero >= self.transition_end:
             return line(from_zero)
-        ends = {"zero_band": self.zero_band_codes, "end": self.transition_end}
+        share = evaluate_share(from_zero, zero_band=self.zero_band_codes, end=self.transition_end)
         lowered = evaluate_transition(
             beta_opening=beta,
             beta_closing=self.beta(dp_code, sign),
             u_min0_over_u_max=u_min0,
-            share_of_transition=evaluate_share(from_zero, **ends),
+            share_of_transition=share,
             n_full=signals.compare_max,
         )
-        return Fraction(line(evaluate_law_command(from_zero, **ends)) - lowered)
+        return Fraction(line(evaluate_law_command(share, end=self.transition_end)) - lowered)
 
     def drive(self, command_code: int, dp_code: int, sign: int = 1) -> Fraction:
         """Return the exact u_O/u_max of the law at a code pair, before limiting to 0...1."""

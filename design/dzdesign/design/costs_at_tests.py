@@ -1,8 +1,7 @@
 """The law at one pressure drop as straight parts, and the dead zone that it leaves at the tests: onset, flow, drive."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from math import inf
 
 import numpy as np
@@ -28,16 +27,27 @@ class LawCorners:
     end: float
     leaves: float
 
-    def lowered(self, at_end: float, at_full: float) -> "LawCorners":
-        """Return the branch of a falling command: lower by so much at the transition's end, and at full command."""
-        return replace(self, at_end=self.at_end - at_end, full=self.full - at_full)
-
     def command_at(self, drive: float) -> float:
         """Return the command at which the drive reaches a threshold."""
         if drive <= self.at_end and self.end:
             passed = (drive - self.offset) / (self.at_end - self.offset) if self.at_end > self.offset else 0.0
             return self.zero_band + (self.end - self.zero_band) * passed
         return self.end + (1 - self.end) * (drive - self.at_end) / (self.full - self.at_end)
+
+
+#: Shares of the largest flow at which the recorded branches are compared.
+LEVELS = tuple(level / 100 for level in range(5, 100))
+
+
+def branch_commands(test: TestResult) -> Iterator[tuple[float, float]]:
+    """Yield the commands, V, at which opening and closing branch pass a flow, level by level; of one branch none."""
+    recorded = test.recorded
+    if recorded.rising is None or recorded.falling is None:
+        return
+    for level in LEVELS:
+        up, down = (each.command_at(level * recorded.q_max_L_min) for each in (recorded.rising, recorded.falling))
+        if up is not None and down is not None:
+            yield up, down
 
 
 def corners_of(compensator: Compensator, dp_code: int, sign: int) -> LawCorners:
@@ -112,8 +122,8 @@ def costs_at_tests(compensator: Compensator, sign: int) -> tuple[CostAtTest, ...
 
 def _cost_at_test(compensator: Compensator, test: TestResult, sign: int) -> CostAtTest:
     side, u_max = SIDE_NAMES[sign], float(compensator.u_max_V)
-    corners = corners_of(compensator, _code_of(compensator, test), sign)
-    corners_of_falling = falling_corners(compensator, _code_of(compensator, test), sign)
+    corners = corners_of(compensator, compensator.signals.code_at(test.dp_MPa), sign)
+    corners_of_falling = falling_corners(compensator, compensator.signals.code_at(test.dp_MPa), sign)
     offset_V, left = corners.offset * u_max, remaining_dead_zone(compensator, test, sign)
     knees = {"opening": test.u_knee_rising_V, "closing": test.u_knee_falling_V}
     above = {name: offset_V - knee for name, knee in knees.items() if knee is not None and knee < offset_V}
@@ -160,7 +170,7 @@ def remaining_dead_zone(compensator: Compensator, test: TestResult, sign: int = 
     share is 0 where flow passes at zero command.
     """
     knees = {"opening": test.u_knee_rising_V, "closing": test.u_knee_falling_V}
-    return _commands_at(compensator, _code_of(compensator, test), sign, knees)
+    return _commands_at(compensator, compensator.signals.code_at(test.dp_MPa), sign, knees)
 
 
 def last_opening(compensator: Compensator, test: TestResult, sign: int) -> float | None:
@@ -170,7 +180,7 @@ def last_opening(compensator: Compensator, test: TestResult, sign: int) -> float
     knee = float(compensator.machine.largest_factor) * test.u_knee_rising_V / float(compensator.u_max_V)
     if knee > compensator.drive_functions.compare_limit / compensator.signals.compare_max:
         return inf
-    return corners_of(compensator, _code_of(compensator, test), sign).command_at(knee)
+    return corners_of(compensator, compensator.signals.code_at(test.dp_MPa), sign).command_at(knee)
 
 
 def between_tests(compensator: Compensator, sign: int) -> float:
@@ -188,7 +198,7 @@ def between_tests(compensator: Compensator, sign: int) -> float:
     if len(known) < len(tests):
         return 0.0
     dp_MPa, knees_V = zip(*known, strict=True)
-    low, high = (round(compensator.signals.dp_code(Fraction(repr(end)))) for end in (dp_MPa[0], dp_MPa[-1]))
+    low, high = (compensator.signals.code_at(end) for end in (dp_MPa[0], dp_MPa[-1]))
     step = compensator.beta_step_codes
     found = [0.0]
     for code in range((low // step + 1) * step, high, step):
@@ -207,12 +217,7 @@ def read_dead_zone(compensator: Compensator, test: TestResult, sign: int = 1) ->
         "opening": recorded.rising.command_at(flow) if recorded.rising else None,
         "closing": recorded.falling.command_at(flow) if recorded.falling else None,
     }
-    return _commands_at(compensator, _code_of(compensator, test), sign, thresholds)
-
-
-def _code_of(compensator: Compensator, test: TestResult) -> int:
-    """Return the difference of pressure codes at a test."""
-    return round(compensator.signals.dp_code(Fraction(repr(test.dp_MPa))))
+    return _commands_at(compensator, compensator.signals.code_at(test.dp_MPa), sign, thresholds)
 
 
 def falling_corners(compensator: Compensator, dp_code: int, sign: int) -> LawCorners:
@@ -224,7 +229,7 @@ def falling_corners(compensator: Compensator, dp_code: int, sign: int) -> LawCor
     codes = (compensator.transition_end, compensator.signals.command.span(sign))
     widths = np.interp(codes, np.arange(len(nodes)) * functions.play_step_codes, nodes)
     at_end, at_full = (float(width) / compensator.signals.compare_max for width in widths)
-    return corners.lowered(at_end, at_full)
+    return replace(corners, at_end=corners.at_end - at_end, full=corners.full - at_full)
 
 
 def _commands_at(

@@ -12,12 +12,13 @@ from dzdesign.core.errors import InputError, quoted
 from dzdesign.core.options import flag_of
 from dzdesign.core.units import parse_quantity
 from dzdesign.design.current.circuit import CoilCircuit, CurrentSensor
-from dzdesign.design.current.drive import OVER_SHARE, CurrentRequest
+from dzdesign.design.current.drive import OVER_SHARE
+from dzdesign.design.current.responses import CurrentRequest
 from dzdesign.design.design_choices import DIGITS, read_error
 from dzdesign.design.machine import COPPER_PER_K, REFERENCE_C, DriveKind, Machine
 from dzdesign.design.signal_text import PinSignal, parse_signal
 from dzdesign.design.signals import Signals
-from dzdesign.design.target_inputs import Converter, TargetInputs
+from dzdesign.design.target_inputs import TargetInputs
 
 #: Options that only current control has a use for, and those that it needs.
 OF_CURRENT = ("coil", "rated_current", "current_signal", "supply_signal", "current_error", "bench_current")
@@ -70,6 +71,7 @@ def current_request(text: Mapping[str, str], read: Mapping[str, Any], target: Ta
             supply_divider=float(supply.volts_per_unit) if supply else 0.0,
         ),
         sampling=target.current_sampling,
+        converter=target.converter,
     )
 
 
@@ -120,7 +122,7 @@ def machine_of(
     if drive == "amplifier":
         keys.values["amplifier_error"] = read["amplifier"]
     if current is not None:
-        _take_current(keys, text, read, target.converter, current)
+        _take_current(keys, text, read, current)
         _check_coil(keys.values, current, text)
     _take_pressures(keys, text, read, signals, target)
     keys.take("oil_error", read["oil"], DEFAULT_OIL, "0.2 %, the paper's Fig. 22")
@@ -184,11 +186,10 @@ def _take_coil(keys: _Keys, text: Mapping[str, str], read: Mapping[str, Any], dr
         )
 
 
-def _take_current(
-    keys: _Keys, text: Mapping[str, str], read: Mapping[str, Any], converter: Converter, current: CurrentRequest
-) -> None:
+def _take_current(keys: _Keys, text: Mapping[str, str], read: Mapping[str, Any], current: CurrentRequest) -> None:
     """Take the accuracy of the controlled current, and of the bench's."""
-    codes = current.sensor.V_per_A * current.circuit.rated_A * converter.levels / float(converter.full_V)
+    converter = current.converter
+    codes = current.sensor.V_per_A * current.circuit.rated_A * current.codes_per_V
     source = f"{CURRENT_CODES} codes of the converter, of rounding and of the calibrated offset"
     keys.take("current_rest_error", None, round(CURRENT_CODES / codes, DIGITS), source)
     gain = Fraction(converter.gain_codes, converter.levels)

@@ -5,6 +5,7 @@ read here too; the rest, such as a signal's codes, in `dzdesign.design.options` 
 """
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Annotated, Any, Literal, get_args
@@ -28,8 +29,8 @@ NEGATIVE_DP: tuple[NegativeDp, ...] = get_args(NegativeDp)
 HYSTERESIS = ("keep", "play")
 ON_OFF = ("on", "off")
 DRIVES = ("duty", "current")
-#: Largest transition, of full command.
-LARGEST_TRANSITION = Fraction(1, 10)
+#: Largest transition, of full command; larger relative errors than the other are no tolerance.
+LARGEST_TRANSITION, LARGEST_ERROR = Fraction(1, 10), Fraction(1, 2)
 #: Beyond any flow that a valve of a control passes.
 MOST_L_MIN = 1e6
 #: Decimals of a number that is read from a text.
@@ -47,26 +48,29 @@ TEMPERATURES = re.compile(
 CODES = re.compile(r"\s*(\d{1,4})\s*\+\s*(\d{1,4})\s*\+\s*(\d{1,4})\s*codes?\s*", re.ASCII)
 
 
-def read_share(text: str, option: str) -> Fraction:
-    """Return a share, exact to a billionth."""
-    return Fraction(round(parse_quantity(text, "ratio", option) * 10**DIGITS), 10**DIGITS)
+def share(most: Fraction, *, or_zero: bool = True) -> Callable[[str, str], Fraction]:
+    """Return what reads a share of at most so much, exact to a billionth."""
+
+    def read(text: str, option: str) -> Fraction:
+        value = Fraction(round(parse_quantity(text, "ratio", option) * 10**DIGITS), 10**DIGITS)
+        if not 0 <= value <= most or not (value or or_zero):
+            least = "0 to" if or_zero else "more than 0, up to"
+            raise InputError(f"{option} is {quoted(text)}, expected {least} {float(most):.0%}")
+        return value
+
+    return read
+
+
+def read_error(text: str, option: str) -> float:
+    """Return a relative error."""
+    return float(share(LARGEST_ERROR)(text, option))
 
 
 def _transition(text: str, option: str) -> Fraction | None:
     """Read ``auto`` (None), ``off`` (0) or a share."""
     if text in ("auto", "off"):
         return Fraction(0) if text == "off" else None
-    share = read_share(text, option)
-    if not 0 <= share <= LARGEST_TRANSITION:
-        raise InputError(f"the transition is {float(share):.3%}, expected 0 to {float(LARGEST_TRANSITION):.0%}")
-    return share
-
-
-def _output_max(text: str, option: str) -> Fraction:
-    share = read_share(text, option)
-    if not 0 < share <= 1:
-        raise InputError(f"the largest output is {float(share):.3%}, expected more than 0, up to 100 %")
-    return share
+    return share(LARGEST_TRANSITION)(text, option)
 
 
 def _reading_flow(text: str, option: str) -> float:
@@ -83,14 +87,6 @@ def _times(text: str, option: str) -> tuple[float, float]:
     if len(parts) > 2:
         raise InputError(f"{option} is '{text}', expected a time, or two such as '0.5 s / 0.8 s'")
     return parts[0], parts[-1]
-
-
-def read_error(text: str, option: str) -> float:
-    """Return a relative error."""
-    value = parse_quantity(text, "ratio", option)
-    if not 0 <= value <= 0.5:
-        raise InputError(f"{option} is {quoted(text)}, expected 0 to 50 %")
-    return round(value, DIGITS)
 
 
 def _temperatures(text: str, option: str) -> tuple[float, float]:
@@ -216,7 +212,9 @@ class DesignChoices:
     reading_flow: Annotated[Text, Option("Q", LAW, example="0.6 L/min", read=_reading_flow)] = None
     """Flow at which dead zones are read, in addition to the onset (default: the meter's floor, or the noise level of a
     meter without one)."""
-    output_max: Annotated[Text, Option("C", LAW, "100 %", example="95 %", read=_output_max)] = None
+    output_max: Annotated[
+        Text, Option("C", LAW, "100 %", example="95 %", read=share(Fraction(1), or_zero=False))
+    ] = None
     """Largest drive, in percent of full drive."""
     accept: Annotated[Text, Option("CODE", LAW, choices="dzdesign.design.options:ACCEPTABLE")] = None
     """Warnings to accept, separated by commas (default: none, the design is refused). branch-order: the valve seems to

@@ -14,16 +14,17 @@ from itertools import pairwise
 
 import numpy as np
 
-from dzdesign.core.artefact_types import THIS_TOOL, SourceFile
+from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
+from dzdesign.core.documents import sha256_of
 from dzdesign.core.errors import InputError
 from dzdesign.core.worded import errors_in
 from dzdesign.derivation.law import Law, law
 from dzdesign.derivation.laws import LAW_NAMES
 from dzdesign.derivation.presentation.formulas import to_text
 from dzdesign.design.beta_table import STEP_CODES
-from dzdesign.design.compensator import Compensator, sha256_of_valve
+from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs import costs_of
-from dzdesign.design.costs_at_tests import corners_of
+from dzdesign.design.costs_at_tests import branch_commands, corners_of
 from dzdesign.design.machine import allowance_of, check_bench_current, dither_reserve
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.pressure_inputs import ACCEPTED, refuse_hidden_failures, with_negative_drop
@@ -39,8 +40,6 @@ REVERSE_SHARE = Fraction(1, 100)
 PLAY_CODES = 8
 #: Most segments of the width over the command.
 SEGMENTS = 16
-#: Shares of the largest flow at which the recorded branches are compared.
-LEVELS = tuple(level / 100 for level in range(5, 100))
 #: Share of command over whose end the width is carried on to full command.
 LAST = 0.05
 
@@ -88,7 +87,7 @@ def _designed(valve: ValveModel, options: DesignOptions) -> Compensator:
         laws[sign] = side_law(side, options, u_max, units, transition_codes, allowance)
     compensator = Compensator(
         tool=THIS_TOOL,
-        made_from=(SourceFile(source=ValveModel.FILE_NAME, sha256=sha256_of_valve(valve)),),
+        made_from=(SourceFile(source=ValveModel.FILE_NAME, sha256=sha256_of(to_json_bytes(valve))),),
         target=options.target,
         options=options.texts,
         law=options.law,
@@ -216,13 +215,9 @@ def _recorded_widths(compensator: Compensator, sign: int) -> Iterator[list[tuple
     for test in compensator.valve.sides[SIDE_NAMES[sign]].tests:
         if test.u_knee_rising_V is None or test.u_knee_falling_V is None:
             continue
-        opening, closing = test.recorded.opening, test.recorded.closing
-        corners = corners_of(compensator, round(compensator.signals.dp_code(Fraction(repr(test.dp_MPa)))), sign)
-        found = []
-        for level in LEVELS:
-            up, down = (each.command_at(level * test.recorded.q_max_L_min) for each in (opening, closing))
-            if up is not None and down is not None:
-                found.append((corners.command_at(up / float(compensator.u_max_V)), up - down))
+        corners = corners_of(compensator, compensator.signals.code_at(test.dp_MPa), sign)
+        u_max = float(compensator.u_max_V)
+        found = [(corners.command_at(up / u_max), up - down) for up, down in branch_commands(test)]
         rising = [place for place, (left, right) in enumerate(pairwise(found)) if left[0] < right[0] < 1]
         yield [found[place] for place in rising]
 

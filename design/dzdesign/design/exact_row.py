@@ -67,14 +67,6 @@ class ExactRow(Sequence[Fraction]):
         pairs = zip(self.numerators, self.denominators, strict=True)
         return ExactRow(tuple(up * n - down * d for n, d in pairs), tuple(unit * d for d in self.denominators))
 
-    def plus(self, other: "ExactRow") -> "ExactRow":
-        """Return the sums, place by place."""
-        left, right = (zip(row.numerators, row.denominators, strict=True) for row in (self, other))
-        pairs = [
-            (n + m, d) if d == e else (n * e + m * d, d * e) for (n, d), (m, e) in zip(left, right, strict=True)
-        ]
-        return ExactRow(tuple(n for n, _ in pairs), tuple(d for _, d in pairs))
-
     def at_least(self, least: Fraction) -> "ExactRow":
         """Return the larger of each number and `least`."""
         up, unit, bound = least.numerator, least.denominator, float(least)

@@ -13,7 +13,7 @@ from itertools import pairwise
 
 from dzdesign.core.errors import InputError
 from dzdesign.core.worded import worded
-from dzdesign.design.ceiling import deepest_MPa
+from dzdesign.design.ceiling import lowest_places
 from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs_at_tests import falling_corners, flow_at_end, remaining_dead_zone
@@ -115,7 +115,7 @@ def fixed_offset(compensator: Compensator, sign: int = 1) -> FixedOffset:
     guard, machine = compensator.side(sign).certificate.guard, compensator.machine
     curve = guarded_curve(model, guard, compensator.below_dp0, "lower", machine)
     pieces = [*(curve.certified.pieces if curve.certified else ()), *_of_the_lot(compensator, sign)]
-    bounds = [(piece.at(place), place) for piece in pieces for place in _lowest_places(piece)]
+    bounds = [(piece.at(place), place) for piece in pieces for place in lowest_places(piece)]
     if error_MPa := allowance.pressures_MPa.get(BENCH_ERROR):
         highest = curve.dp_MPa[-1] + error_MPa
         bounds.append((curve.at(highest), highest))  # above the tests it never rises
@@ -128,14 +128,6 @@ def fixed_offset(compensator: Compensator, sign: int = 1) -> FixedOffset:
             "all of the certified one; use the law with pressure sensors, or declare a smaller budget"
         )
     return FixedOffset(sign=sign, share=share, lowest_at_MPa=lowest_at, dp_MPa=(curve.dp_MPa[0], curve.dp_MPa[-1]))
-
-
-def _lowest_places(piece: BoundPiece) -> Iterator[Fraction]:
-    """Yield where a piece of the bound may be lowest, MPa: its ends, and where its sag is deepest if that is inside."""
-    yield piece.from_MPa
-    yield piece.to_MPa
-    if piece.curvature > 0 and piece.from_MPa < (deepest := deepest_MPa(piece)) < piece.to_MPa:
-        yield deepest
 
 
 def _of_the_lot(compensator: Compensator, sign: int) -> Iterator[BoundPiece]:
@@ -230,7 +222,7 @@ def dead_zones(compensator: Compensator, characteristic: Characteristic, sign: i
 
 def _at_test(compensator: Compensator, characteristic: Characteristic, test: TestResult, sign: int) -> FixedDeadZone:
     end_code, signals = compensator.transition_end, compensator.signals
-    dp_code = round(signals.dp_code(Fraction(repr(test.dp_MPa))))
+    dp_code = signals.code_at(test.dp_MPa)
     knees = {"opening": test.u_knee_rising_V, "closing": test.u_knee_falling_V}
     by_law = falling_corners(compensator, dp_code, sign).at_end
     by_fixed = float(characteristic.drive(Fraction(end_code, signals.command.span(sign))))

@@ -1,14 +1,14 @@
 """One setting for many valves: the largest offset that over-compensates none of them, and the proof of that.
 
-Its offset lies, at every pressure code, under the least of the valves' certified ceilings. That is proved as for one
-valve, by `certify`, for every valve that comes within `CLEAR` of the least ceiling where one was tested. That it lies
-under the bounds of every valve is proved of each of them, by `prove_lot`, here and by `verify`.
+Its offset lies, at every pressure code, under the least of the valves' certified ceilings. That it lies under the
+bounds of every valve is proved of each of them, by `prove_lot`, here and where a compensator from a file is designed
+again.
 
 A compensator's file holds the valve that its certificate follows from. The common one holds a real valve of the batch,
 its *carrier*, and never an invented one with the least thresholds of all: no ramp test ever showed that.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import ceil, floor
@@ -18,27 +18,24 @@ import numpy as np
 from dzdesign.core.errors import InputError, RequirementError, and_more
 from dzdesign.core.worded import worded
 from dzdesign.design.beta_table import between_nodes, choose_beta_table
-from dzdesign.design.ceiling import OffsetCeiling, OffsetCurve, deepest_MPa, offset_ceiling
-from dzdesign.design.certificate import certified, guarded_curve
+from dzdesign.design.ceiling import OffsetCeiling, OffsetCurve, at_codes, lowest_places, offset_ceiling
+from dzdesign.design.certificate import guarded_curve, with_certificates
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs import costs_of
 from dzdesign.design.designing import design, prove_monotone
 from dzdesign.design.exact_row import ExactRow, least_of
 from dzdesign.design.lot_valves import LotValve
-from dzdesign.design.machine import Allowance
 from dzdesign.design.options import options_of
 from dzdesign.design.side_design import finest_units, left_by_machine, offset_at_reference, over, travel
-from dzdesign.design.side_law import Certificate, SideLaw, Sides
-from dzdesign.design.signals import SIDE_NAMES, Signals
-from dzdesign.identify.valve.certified_bound import BoundPiece, CertifiedBound
+from dzdesign.design.side_law import SideLaw, Sides
+from dzdesign.design.signals import SIDE_NAMES
+from dzdesign.identify.valve.certified_bound import BoundPiece
 from dzdesign.identify.valve.side_model import SideModel
 
 #: Of u_max: a valve whose ceiling comes this near to the least one of all holds the setting down.
 CLEAR = 1e-6
 #: Over-compensated valves that a sentence names.
 NAMED = 5
-#: Drives that are this near to the nearest one by doubles, V, are compared exactly.
-CLOSE_V = 1e-9
 #: What all compensators of a batch must have in common.
 SHARED = (
     "law", "below_dp0", "above", "signals", "u_max_V", "beta_denominator",
@@ -52,8 +49,6 @@ class LotMargin:
 
     #: Of the valve.
     name: str
-    #: Of the command, where that is least.
-    sign: int
     #: Pressure drop, where it is least.
     dp_MPa: Fraction
     #: The least distance; negative of a valve that is over-compensated.
@@ -70,11 +65,9 @@ class LotSetting:
     carrier: str
     #: Pressure drops that every valve was tested over: inside, the setting is certified for each of them.
     dp_MPa: tuple[float, float]
-    #: Valves that hold the offset down where one was tested, or below; for these `proved` has an exact certificate.
-    #: Above all tests, where the offset falls anyway, the steepest would: that costs no tested pressure drop anything.
+    #: Valves that hold the offset down where one was tested, or below. Above all tests, where the offset falls anyway,
+    #: the steepest would: that costs no tested pressure drop anything.
     binding: tuple[str, ...]
-    #: Name to a certificate per sign of command.
-    proved: Mapping[str, tuple[Certificate, ...]]
     #: Of every valve of the batch: how far the offset stays under its bound.
     margins: tuple[LotMargin, ...]
 
@@ -125,16 +118,8 @@ def lot_setting(batch: Mapping[str, Compensator]) -> LotSetting:
     )
     for side in sides:
         prove_monotone(compensator, side.sign)
-        certificate, budget = certified(compensator, side.models[carrier], side.sign)
-        laws[side.sign] = replace(laws[side.sign], certificate=certificate, budget=budget)
-    compensator = replace(compensator, sides=Sides(positive=laws[1], negative=laws.get(-1)))
+    compensator = with_certificates(compensator)
     margins = prove_lot(compensator)
-    proved = {
-        name: tuple(
-            certified(compensator, side.models[name], side.sign)[0] for side in sides if name in side.binding
-        )
-        for name in batch if any(name in side.binding for side in sides)
-    }
     line = (
         f"lot setting of {len(batch)} valves: under the bounds of each, with that valve's own confidence; this file "
         f"holds the valve {carrier}, for which the lines above are"
@@ -144,8 +129,7 @@ def lot_setting(batch: Mapping[str, Compensator]) -> LotSetting:
         compensator=compensator,
         carrier=carrier,
         dp_MPa=_common_interval(side.curves for side in sides),
-        binding=tuple(proved),
-        proved=proved,
+        binding=tuple(name for name in batch if any(name in side.binding for side in sides)),
         margins=margins,
     )
 
@@ -277,73 +261,58 @@ def _law(side: _Side, carrier: str, first: Compensator) -> SideLaw:
 
 
 def lot_margins(compensator: Compensator) -> tuple[LotMargin, ...]:
-    """Return each valve's margin, exactly, at every code of its own tested interval, worst side, worst code.
+    """Return each valve's margin, exactly: at every pressure drop of its tests, under the largest offset read there.
 
-    A code stands for all pressures that may have made it; rounding, dither and the machine count as in a ceiling.
+    Between two codes a bound is lowest at one of them, at an end of its piece or where that sags deepest; the codes
+    that may be read there are those of both. Rounding, dither and the machine count as in a ceiling.
     """
-    signals = compensator.signals
     margins: dict[str, LotMargin] = {}
-    for sign in signals.signs:
-        law = compensator.side(sign)
-        allowance = compensator.allowance(sign)
-        low, high = window = allowance.window
-        count = signals.largest_difference(sign) + 1
-        numerators = between_nodes(law.beta, count, compensator.beta_step_codes)
-        scale = compensator.beta_denominator * compensator.beta_step_codes
-        unit_V = law.u_min0_over_u_max * compensator.u_max_V / scale
+    for sign in compensator.signals.signs:
+        drive = _Drive(compensator, sign)
         for valve in compensator.lot:
             side = valve.side(sign)
             if side is None:
                 raise InputError(f"'{valve.name}' of the lot has no bounds of the negative side; run `batch` again")
-            for piece in side.bound().pieces:
-                left, right = piece.from_MPa, piece.to_MPa
-                first = max(ceil(signals.dp_code(left)) - high, 0)
-                last = min(floor(signals.dp_code(right)) - low, numerators.size - 1)
-                if first > last and left == right:  # one test, between two codes: both of them count
-                    first, last = last, min(first, numerators.size - 1)
-                if first > last:
-                    continue
-                drive_V = numerators[first : last + 1] * float(unit_V)
-                nearest = first + _nearest(piece, allowance, first, drive_V)
-                over, code = max(
-                    (
-                        int(numerators[code]) * unit_V - allowance.factor * _least(piece, signals, int(code), window),
-                        -int(code),
-                    )
-                    for code in nearest
-                )
-                code = -code
-                margin = -over - allowance.kept * compensator.u_max_V
-                if valve.name not in margins or margin < margins[valve.name].margin_V:
-                    margins[valve.name] = LotMargin(
-                        name=valve.name, sign=sign, dp_MPa=signals.dp_MPa(code), margin_V=margin
-                    )
+            places = {place for piece in side.bound().pieces for place in drive.nearest(piece)}
+            margin_V, dp_MPa = min(places)
+            if valve.name not in margins or margin_V < margins[valve.name].margin_V:
+                margins[valve.name] = LotMargin(name=valve.name, dp_MPa=dp_MPa, margin_V=margin_V)
     return tuple(margins.values())
 
 
-def _least(piece: BoundPiece, signals: Signals, code: int, error: tuple[int, int]) -> Fraction:
-    """Return the least bound over the pressure drops that a code may stand for, as far as the piece reaches, V."""
-    low, high = (signals.dp_MPa(code + each) for each in error)
-    return piece.least(max(min(low, piece.to_MPa), piece.from_MPa), min(max(high, piece.from_MPa), piece.to_MPa))
+class _Drive:
+    """The offsets of a compensator's law of a sign, code by code, and how far bounds lie above them."""
 
+    def __init__(self, compensator: Compensator, sign: int) -> None:
+        law, count = compensator.side(sign), compensator.signals.largest_difference(sign) + 1
+        scale = compensator.beta_denominator * compensator.beta_step_codes
+        self.allowance = compensator.allowance(sign)
+        self.kept_V = self.allowance.kept * compensator.u_max_V
+        self.unit_V = law.u_min0_over_u_max * compensator.u_max_V / scale
+        self.numerators = between_nodes(law.beta, count, compensator.beta_step_codes)
+        low, high = self.allowance.window
+        around = np.pad(self.numerators, (high, -low), mode="edge")
+        #: The largest that may be read at a pressure whose code is whole.
+        self.highest = np.lib.stride_tricks.sliding_window_view(around, high - low + 1).max(axis=1).tolist()
 
-def _nearest(piece: BoundPiece, allowance: Allowance, first: int, drive_V: np.ndarray) -> np.ndarray:
-    """Return which drives, from the code `first` on, may come nearest to a piece: by doubles, to `CLOSE_V`."""
-    signals = allowance.signals
-    codes = first + np.arange(drive_V.size)
-    zero, step = float(signals.dp_MPa(0)), float(signals.dp_MPa(1) - signals.dp_MPa(0))
-    from_MPa, to_MPa = float(piece.from_MPa), float(piece.to_MPa)
-    low, high = (np.clip(zero + step * (codes + each), from_MPa, to_MPa) for each in allowance.window)
-    places = [low, high]
-    if piece.curvature > 0:
-        places.append(np.clip(float(deepest_MPa(piece)), low, high))
-    bound = CertifiedBound(pieces=(piece,))
-    least = np.min([bound.in_doubles(place) for place in places], axis=0)
-    left_V = float(allowance.factor) * least - drive_V
-    near: np.ndarray = np.flatnonzero(left_V <= left_V.min() + CLOSE_V)
-    if piece.curvature == 0 and piece.low_V == piece.high_V:  # a step: the largest drive comes nearest, the first of it
-        return np.array([int(drive_V.argmax())])
-    return near
+    def nearest(self, piece: BoundPiece) -> Iterator[tuple[Fraction, Fraction]]:
+        """Yield the margin, V, and the pressure drop, MPa, of places one of which comes nearest to a piece's bound."""
+        signals, (low, high) = self.allowance.signals, self.allowance.window
+        ends = [signals.dp_code(end) for end in (piece.from_MPa, piece.to_MPa)]
+        codes = range(max(ceil(ends[0]), 0), min(floor(ends[1]) + 1, self.numerators.size))
+        places = list(lowest_places(piece))
+        if codes:
+            bounds, unit = at_codes(piece, signals.dp_MPa(1), codes)
+            up, down = self.allowance.factor / unit, self.unit_V
+            one, other = up.numerator * down.denominator, down.numerator * up.denominator
+            left = [bound * one - self.highest[code] * other for bound, code in zip(bounds, codes, strict=True)]
+            places.append(signals.dp_MPa(codes[left.index(min(left))]))
+        for place in places:
+            code = signals.dp_code(place)
+            first, last = sorted((ceil(code) - high, floor(code) - low))  # between two codes both count
+            first = max(min(first, self.numerators.size - 1), 0)
+            read = int(self.numerators[first : max(last, first) + 1].max())
+            yield self.allowance.factor * piece.at(place) - read * self.unit_V - self.kept_V, place
 
 
 def prove_lot(compensator: Compensator) -> tuple[LotMargin, ...]:

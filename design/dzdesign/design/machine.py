@@ -34,16 +34,6 @@ LARGEST_MPa = 100.0
 
 #: What stands between the law's output and the coil.
 DriveKind = Literal["duty", "amplifier", "current"]
-#: Keys that are null for another drive; temperature and supply may be declared for any.
-NEEDED_BY: Mapping[str, tuple[DriveKind, ...]] = {
-    "coil_temperature_C": ("duty",),
-    "supply_V": ("duty",),
-    "amplifier_error": ("amplifier",),
-    "current_error": ("current",),
-    "current_rest_error": ("current",),
-    "bench_current_error": ("current",),
-}
-OF_ANY_DRIVE = ("coil_temperature_C", "supply_V")
 Share = Annotated[float, Meta(ge=0, le=LARGEST_SHARE)]
 Pressure = Annotated[float, Meta(ge=0, le=LARGEST_MPa)]
 Error = Annotated[int, Meta(ge=0, le=4095)]
@@ -111,36 +101,11 @@ class Machine:
                 raise RuleError(f"{what} is beyond {low:g} to {high:g} {unit}")
             if ends is not None and ends[0] > ends[1]:
                 raise RuleError(f"{what} runs from {ends[0]:g} to {ends[1]:g} {unit}, expected the lower end first")
-        for name, drives in NEEDED_BY.items():
-            missing = getattr(self, name) is None
-            if missing and self.drive in drives:
-                raise RuleError(f"{name} is missing in a machine whose drive is '{self.drive}'")
-            if not missing and self.drive not in drives and name not in OF_ANY_DRIVE:
-                raise RuleError(f"{name} stands in a machine whose drive is '{self.drive}'")
         for name in self.__slots__:
             value = getattr(self, name)
             limit = LARGEST_MPa if name.endswith("_MPa") else LARGEST_SHARE
             if "_error" in name and value is not None and not 0 <= value <= limit:
                 raise RuleError(f"{name} is {value:g}, expected 0 to {limit:g}")
-        if unknown := set(self.defaults) - set(self.__slots__):
-            raise RuleError(f"'defaults' names {sorted(unknown)[0]!r}, expected a key of the machine")
-
-    def drive_factor(
-        self, temperature_C: float = float(REFERENCE_C), supply_V: float = 0.0, current_ratio: float = 1.0
-    ) -> Fraction:
-        """Return the threshold as a drive on the machine over that on the bench, exactly.
-
-        Parameters
-        ----------
-        temperature_C, supply_V : float
-            Of the machine; they count where the duty goes straight to the coil.
-        current_ratio : float
-            Current for a drive over that on the bench; it counts with an amplifier or a controlled current.
-        """
-        if self.drive != "duty":
-            return 1 / _exact(current_ratio)
-        bench_C, bench_V = _exact(self.bench_coil_C or 0.0), _exact(self.bench_supply_V or 0.0)
-        return _resistance(_exact(temperature_C)) / _resistance(bench_C) * bench_V / _exact(supply_V)
 
     @property
     def least_factors(self) -> dict[Component, Fraction]:
@@ -294,8 +259,6 @@ def dither_reserve(
 LEAST_COIL_A = 0.05
 #: Two currents are one to this share: the rounding of units.
 SAME_CURRENT = 1e-6
-
-
 
 
 def recorded_full_A(valve: ValveModel) -> float | None:

@@ -10,9 +10,10 @@ from dzdesign.core.dither import HIGHEST_HZ, LARGEST_PEAK, LOWEST_HZ, parted
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.options import arguments_of, flag_of, read_options
 from dzdesign.core.units import parse_quantity
-from dzdesign.design.current.drive import CurrentDrive, CurrentRequest, design_current_drive
+from dzdesign.design.current.drive import CurrentDrive, design_current_drive
+from dzdesign.design.current.responses import CurrentRequest
 from dzdesign.design.declared import current_request, machine_of
-from dzdesign.design.design_choices import DEFAULTS, Above, BelowDp0, DesignChoices, NegativeDp, read_share
+from dzdesign.design.design_choices import DEFAULTS, Above, BelowDp0, DesignChoices, NegativeDp, share
 from dzdesign.design.drive_functions import MOST_FAULT_SAMPLES, RAMP_UNIT, DriveFunctions
 from dzdesign.design.machine import Machine
 from dzdesign.design.signal_text import (
@@ -127,9 +128,8 @@ class DesignOptions:
             return None
         if len(self.signals.signs) == 2:
             raise InputError("--drive current is for one solenoid, but the command has both signs; give --drive duty")
-        converter = self.target.converter if self.target else Converter()
         dither = (self._dither_counts(), self._dither_ticks())
-        return design_current_drive(self.current, converter, self.signals.compare_max, dither)
+        return design_current_drive(self.current, self.signals.compare_max, dither)
 
     def drive_functions(self, transition_codes: int) -> DriveFunctions:
         """Return what the drive does around the law, in the firmware's integers."""
@@ -272,9 +272,7 @@ def _dither(text: str) -> tuple[float, Fraction]:
     if text == "off":
         return 0.0, Fraction(0)
     frequency_Hz, peak_text = parted(text, "--dither", "'off', or ")
-    peak = read_share(peak_text, "--dither")
-    if not 0 <= peak <= LARGEST_PEAK:
-        raise InputError(f"the dither is {float(peak):.3%}, expected 0 to {LARGEST_PEAK:.0%}")
+    peak = share(Fraction(repr(LARGEST_PEAK)))(peak_text, "--dither")
     if not (frequency_Hz and peak):
         raise InputError("a dither needs both, a frequency and a peak, such as '150 Hz 1 %'")
     if not LOWEST_HZ <= frequency_Hz <= HIGHEST_HZ:

@@ -7,16 +7,22 @@ table and advice of `dzdesign design`.
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from itertools import takewhile
 
 import numpy as np
 
 from dzdesign.core.errors import InputError, RequirementError, quoted
 from dzdesign.core.value_differences import differences
-from dzdesign.design.certificate import prove_certificates
+from dzdesign.core.worded import errors_in
+from dzdesign.design.certificate import with_certificates
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.costs_at_tests import between_tests, corners_of, read_dead_zone, remaining_dead_zone
-from dzdesign.design.designing import LEVELS, design
+from dzdesign.design.costs_at_tests import (
+    between_tests,
+    branch_commands,
+    corners_of,
+    read_dead_zone,
+    remaining_dead_zone,
+)
+from dzdesign.design.designing import design
 from dzdesign.design.lot_setting import prove_lot
 from dzdesign.design.lot_valves import LotSide
 from dzdesign.design.options import options_of
@@ -25,8 +31,6 @@ from dzdesign.identify.valve.ramp_result import TestResult
 
 #: Coarsest unit of the law's coefficients, see `dzdesign.design.side_design`.
 COARSEST = Fraction(1, 2**12)
-#: Characters before the first difference of two texts that a message shows.
-CONTEXT = 12
 #: The choices, simplest first: what is given to `design` beside the options that were.
 WAYS: Mapping[str, Mapping[str, str]] = {
     "--transition off": {"transition": "off", "hysteresis": "keep"},
@@ -49,8 +53,9 @@ def refuse_without_options(compensator: Compensator, source: str) -> None:
 def prove_derived(compensator: Compensator) -> None:
     """Design the compensator again from the valve and the options in it; refuse the first key that does not follow.
 
-    Of a lot's setting the sides are not those of the one valve in the file: their certificates are proved, and that the
-    setting over-compensates no valve. Of a file that does not say what was asked for nothing can be told.
+    Of a lot's setting the sides are not those of the one valve in the file: only their certificates and budgets follow
+    from it, and it is proved that the setting over-compensates no valve. Of a file that does not say what was asked for
+    nothing can be told.
     """
     if compensator.target is None or compensator.options is None:
         return
@@ -59,19 +64,19 @@ def prove_derived(compensator: Compensator) -> None:
     except InputError as error:
         raise InputError(f"its valve can't be designed with its options: {error}; {Compensator.REMEDY}") from error
     if compensator.lot:
-        prove_certificates(compensator)
         try:
-            prove_lot(compensator)
+            with errors_in(compensator.valve.recorded_units):
+                sides = with_certificates(compensator).sides
+                prove_lot(compensator)
         except RequirementError as error:
             raise InputError(f"{error}; make it again with `dzdesign batch`") from error
         _prove_lot_setting(compensator, redesigned)
-        redesigned = replace(redesigned, sides=compensator.sides, lot=compensator.lot, costs=compensator.costs)
+        redesigned = replace(redesigned, sides=sides, lot=compensator.lot, costs=compensator.costs)
     redesigned = replace(redesigned, tool=compensator.tool)
     for found in differences(compensator, redesigned):
-        stated, follows = _from_where_they_differ(found.stated, found.follows)
         raise InputError(
-            f"'{found.place}' is {_words(stated)}, but {_words(follows)} follows from its valve and its options; "
-            f"{Compensator.REMEDY}"
+            f"'{found.place}' is {_words(found.stated)}, but {_words(found.follows)} follows from its valve and its "
+            f"options; {Compensator.REMEDY}"
         )
 
 
@@ -99,16 +104,6 @@ def _prove_lot_setting(compensator: Compensator, redesigned: Compensator) -> Non
                 f"the lot has no valve with the hash and the {name} bounds of the valve in the file; make it again "
                 "with `dzdesign batch`"
             )
-
-
-def _from_where_they_differ(stated: object, follows: object) -> tuple[object, object]:
-    """Return two values, of long texts what stands about their first difference: a message shows only so much."""
-    if not (isinstance(stated, str) and isinstance(follows, str)):
-        return stated, follows
-    alike = takewhile(lambda pair: pair[0] == pair[1], zip(stated, follows, strict=False))
-    same = sum(1 for _ in alike)
-    begin = stated.rfind(" ", 0, max(same - CONTEXT, 0)) + 1
-    return stated[begin:], follows[begin:]
 
 
 def _words(value: object) -> str:
@@ -205,7 +200,7 @@ def hysteresis_left(made: Compensator, test: TestResult, sign: int = 1) -> np.nd
     """
     if test.recorded.rising is None or test.recorded.falling is None or test.dp_MPa is None:
         return np.zeros(0)
-    corners = corners_of(made, round(made.signals.dp_code(Fraction(repr(test.dp_MPa)))), sign)
+    corners = corners_of(made, made.signals.code_at(test.dp_MPa), sign)
     functions, span = made.drive_functions, made.signals.command.span(sign)
     share = np.arange(span + 1) / span
     ends = ([0.0, corners.zero_band, corners.end, 1.0], [corners.offset, corners.offset, corners.at_end, corners.full])
@@ -215,14 +210,9 @@ def hysteresis_left(made: Compensator, test: TestResult, sign: int = 1) -> np.nd
         at = np.arange(len(nodes)) * functions.play_step_codes / span
         begun = np.clip((share - corners.zero_band) / (corners.end - corners.zero_band), 0, 1)
         falling = rising - np.interp(share, at, np.array(nodes) / made.signals.compare_max) * begun
-    found = []
-    for level in LEVELS:
-        flow = level * test.recorded.q_max_L_min
-        up, down = test.recorded.rising.command_at(flow), test.recorded.falling.command_at(flow)
-        drives = [each / float(made.u_max_V) for each in (up, down) if each is not None]
-        if len(drives) == 2 and drives[0] < rising[-1]:
-            opened, closed = (
-                float(np.interp(drive, branch, share)) for drive, branch in zip(drives, (rising, falling), strict=True)
-            )
-            found.append(opened - closed)
+    found, u_max = [], float(made.u_max_V)
+    for up, down in branch_commands(test):
+        if up / u_max < rising[-1]:
+            opened, closed = np.interp(up / u_max, rising, share), np.interp(down / u_max, falling, share)
+            found.append(float(opened - closed))
     return np.array(found)

@@ -8,9 +8,8 @@ from math import gcd
 from dzdesign.core.errors import InputError
 from dzdesign.core.worded import worded
 from dzdesign.design.beta_table import STEP_CODES, choose_beta_table, released_from
-from dzdesign.design.budget import budget_of
-from dzdesign.design.ceiling import OffsetCeiling, OffsetCurve, offset_ceiling, offset_row
-from dzdesign.design.certificate import certify, guarded_curve, hold_below
+from dzdesign.design.ceiling import OffsetCeiling, OffsetCurve, offset_row
+from dzdesign.design.certificate import GuardedSide, hold_below
 from dzdesign.design.design_choices import Above
 from dzdesign.design.exact_row import ExactRow
 from dzdesign.design.machine import Allowance
@@ -166,11 +165,10 @@ def opening_ceiling(
     limit = offset_row(opening, signals, 0, last)
     if guarded.above is not None and tested.stop <= last:
         let_go = min(released_from(above, tested) or last + 1, last + 1)
-        height = limit[tested.stop :].line(Fraction(1), guarded.offset_V[-1])
-        held = height[: let_go - tested.stop]
-        if held:
-            held = held.plus(offset_row(guarded, signals, tested.stop, let_go - 1))
-        limit = limit[: tested.stop].followed_by(held).followed_by(height[len(held) :])
+        height = opening.offset_V[-1] - guarded.offset_V[-1]
+        held = offset_row(guarded, signals, tested.stop, let_go - 1).line(Fraction(1), -height)
+        left = ExactRow.joined([([height.numerator] * (last + 1 - let_go), height.denominator)])
+        limit = limit[: tested.stop].followed_by(held).followed_by(left)
     return OffsetCeiling(limit=limit.line(1 / u_max), certified=tested)
 
 
@@ -186,10 +184,10 @@ def side_law(
     signals = options.signals
     if "branch-order" not in options.accept:
         refuse_crossed_branches(side)
-    certified = guarded_curve(side, options.guard, options.below_dp0, options.above, options.machine)
+    guarded = GuardedSide.of(side, options.guard, options, u_max, allowance)
+    certified, ceiling = guarded.curve, guarded.ceiling
     opening = opening_offset(side, options) if transition_codes else None
     reference = Fraction(repr(side.reference.dp_MPa))
-    ceiling = offset_ceiling(certified, u_max, allowance)
     tested, goes_on = ceiling.certified, certified.above is not None
     _refuse_no_offset(ceiling.limit[: tested.stop] if goes_on else ceiling.limit, options)
     top = (opening or certified).at(reference)
@@ -204,23 +202,14 @@ def side_law(
         under = opening_ceiling(opening, certified, tested, options.above, allowance, u_max)
         upper = table(under, above="lower" if goes_on else None)
         transition_beta = tuple(map(max, upper, beta))
+    certificate, budget = guarded.certify(u_min0, beta, units.beta)
     return SideLaw(
         drive_range_over_u_max=over(travel(side, u_max, top), "nearest", units.coefficient),
         u_min0_over_u_max=u_min0,
         beta=beta,
         transition_beta=transition_beta,
-        certificate=certify(
-            side,
-            certified,
-            ceiling,
-            guard=options.guard,
-            signals=signals,
-            u_max_V=u_max,
-            u_min0=u_min0,
-            table=beta,
-            denominator=units.beta,
-        ),
-        budget=budget_of(side, certified, u_max, allowance, options.guard, options.machine),
+        certificate=certificate,
+        budget=budget,
     )
 
 

@@ -133,9 +133,6 @@ class Signals:
     """Whether the pressure drop at negative commands is B minus A."""
 
     def __post_init__(self) -> None:
-        for name in ("code_max", "compare_max", "sample_Hz", "tick_Hz"):
-            if not 1 <= getattr(self, name) <= CODE_LIMIT:
-                raise RuleError(f"{name} is {getattr(self, name)}, expected 1 to {CODE_LIMIT} (16 bits)")
         if self.tick_Hz % self.sample_Hz:
             raise RuleError(
                 f"tick_Hz is {self.tick_Hz} and sample_Hz {self.sample_Hz}, "
@@ -225,6 +222,10 @@ class Signals:
         """Return the difference of pressure codes that a pressure drop makes, exactly (not rounded)."""
         code: Fraction = pressure_drop_code(dp_MPa, span=self.pressure_a.span_MPa, code_max=self._span_codes)
         return code
+
+    def code_at(self, dp_MPa: float | None) -> int:
+        """Return the difference of pressure codes that is nearest to a pressure drop of valve.json."""
+        return round(self.dp_code(Fraction(repr(dp_MPa))))
 
     @property
     def _span_codes(self) -> int:

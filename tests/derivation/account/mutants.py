@@ -211,7 +211,7 @@ class _Account:
         statements = {**self.statements, mutant.number: mutant}
         try:
             if statement.grounds:
-                check_grounds(statement, _before(statement, statements), list(statements))
+                check_grounds(statement, _before(statement, statements))
             return not judge(statement, statements, self.verdicts).as_expected
         except RequirementError:
             return True

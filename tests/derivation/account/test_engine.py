@@ -81,14 +81,12 @@ def with_grounds(number, *grounds):
 @pytest.mark.parametrize(
     ("named", "statements"),
     [
-        ("the account: its own premise", with_grounds("(13)", "(12)", "(13)")),
         # (13) from (14) and (14) from (13): each would give the other.
         ("the account: a circular chain", with_grounds("(13)", "u_O", "(14)")),
         (
             "the account: a copy",
             [given("copy", s.u_0, sympy.expand(BY_NUMBER["(13)"].members[-1])), *with_grounds("(13)", "copy")],
         ),
-        ("the account: unknown", with_grounds("(13)", "(99)")),
         ("the account: repeated", [*STATEMENTS[:3], STATEMENTS[0]]),
         ("a statement: without grounds", changed("(18)", grounds=())),
         ("a statement: given, with grounds", changed("(1)", grounds=(Ground(number="(2)"),))),

@@ -4,11 +4,8 @@ import ast
 from pathlib import Path
 
 import pytest
-import sympy
 
 from dzdesign.commands import derive
-from dzdesign.derivation import plant
-from dzdesign.derivation import symbols as s
 from dzdesign.derivation.account import account, published
 from dzdesign.derivation.account.account import STATEMENTS
 from dzdesign.derivation.account.published import FIRST, PRINTED, SIMULATION, find_misprints
@@ -90,11 +87,3 @@ def test_the_account_takes_published_numbers_from_one_place():
     }
     # Of our own: 1 % of u_max above the first valve's threshold.
     assert typed == {("law_theorems.py", "5.49")}
-
-
-def test_the_current_by_its_transfer_function_is_the_current_in_time():
-    numbers = {s.K_a: 2, s.K_fi: 3, s.R_c: 5, s.r_p: 1, s.L_c: 4}
-    step = BY_NUMBER["T6a"].members[0].subs({s.U_i: 1 / s.s}).subs(numbers)
-    current = sympy.inverse_laplace_transform(step, s.s, s.t)
-    slope = plant.state_derivatives().di_dt.subs({s.u_i: 1}).subs(numbers).subs(s.i, current)
-    assert sympy.simplify(sympy.diff(current, s.t) - slope) == 0

@@ -12,7 +12,7 @@ from msgspec import UNSET
 from dzdesign.api import identify
 from dzdesign.core.dither import Dither
 from dzdesign.core.errors import InputError
-from dzdesign.design.designing import LEVELS
+from dzdesign.design.costs_at_tests import LEVELS
 from dzdesign.design.redesign import hysteresis_choices, hysteresis_left
 from dzdesign.verify.closed_loop.loop import ClosedLoop
 from dzdesign.verify.closed_loop.plant import Plant, read_plant

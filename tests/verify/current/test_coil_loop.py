@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from dzdesign.design.current.circuit import Corner
-from dzdesign.design.current.drive import sensor_line
 from dzdesign.design.current.responses import run_loop
 from dzdesign.verify.current.coil import CoilLoop, CoilSimulation
 from dzdesign.verify.current.controller_states import OPEN, OVER, SHORT
 from tests.support.current_loops import current_texts
-from tests.support.example_coil import COIL, CONVERTER, SAMPLING, SENSORS, example_loop
+from tests.support.example_coil import COIL, CONVERTER, SAMPLING, SENSORS, asked, example_loop
 from tests.support.synthetic import needs_compiler
 
 pytestmark = needs_compiler
@@ -29,8 +28,7 @@ def simulation(name: str, edit=lambda text: text, **changed) -> CoilSimulation:
 def test_what_design_reckons_with_is_what_the_c_does(name):
     """Every compare value of every corner over steps up and down, from rest on; the current to a nanoampere."""
     simulated, corners = simulation(name), list(COIL.corners())
-    line = sensor_line(SENSORS[name], CONVERTER)
-    means, compares = run_loop(simulated.around.loop, COIL, corners, SAMPLING, line, STEP)
+    means, compares = run_loop(simulated.around.loop, asked(SENSORS[name]), corners, STEP)
     for place, corner in enumerate(corners):
         found = simulated.run(corner, STEP)
         assert not found["faults"].any()

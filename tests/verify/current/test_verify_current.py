@@ -16,7 +16,7 @@ from dzdesign.verify.current.current_checks import current_checks
 from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4
 from tests.codegen.test_current_control import MEASURED, TEXTS
 from tests.support.evidence import verify
-from tests.support.example_coil import COIL, CONVERTER, SAMPLING, SENSORS, example_loop
+from tests.support.example_coil import COIL, CONVERTER, SAMPLING, SENSORS, asked, example_loop
 from tests.support.synthetic import needs_compiler
 from tests.support.written_firmware import designed, replaced, written
 
@@ -151,7 +151,7 @@ def test_a_small_fast_coil_has_the_margins_that_were_chosen():
     sensor = SENSORS["supply measured"]
     huge = Gains(proportional=1e4, integral=1.0, feed_forward=1.0, supply_measured=True)
     assert margins(coil, coil.nominal, SAMPLING, huge, 0.5).phase_deg == 0
-    loop = choose_loop(coil, sensor, CONVERTER, SAMPLING, compare_max=60000)
+    loop = choose_loop(asked(sensor, coil), 60000)
     around = CoilLoop(loop=loop, circuit=coil, sensor=sensor, converter=CONVERTER, sampling=SAMPLING)
     assert min(stability_margins(around, corner).phase_deg for corner in around.corners()) >= 50
 
@@ -190,7 +190,7 @@ def test_machine_code_has_a_row_for_the_controller(controlled, tmp_path, monkeyp
 
 def test_a_set_point_that_the_supply_cannot_carry_is_said(controlled, tmp_path):
     weak = CoilCircuit(resistance_ohm=16.0, inductance_H=0.04, rated_A=1.0, supply_V=(18.0, 32.0))
-    loop = choose_loop(weak, CurrentSensor(V_per_A=2.0, offset_V=0.15), CONVERTER, SAMPLING, compare_max=60000)
+    loop = choose_loop(asked(CurrentSensor(V_per_A=2.0, offset_V=0.15), weak), 60000)
     assert loop.compare_limit == 60000 and Fraction(loop.full_counts, 60000) == 1
     drive = replace(controlled.current_drive, circuit=weak, loop=loop)
     other = replace(controlled, current_drive=drive)

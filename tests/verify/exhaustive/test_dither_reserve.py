@@ -9,8 +9,8 @@ from msgspec import UNSET
 
 from dzdesign.codegen.core.certificate_text import certificate_lines
 from dzdesign.core.dither import Dither, DrivenDither
-from dzdesign.core.errors import InputError
-from dzdesign.design.certificate import prove_certificates
+from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.design.certificate import with_certificates
 from dzdesign.design.designing import design
 from dzdesign.design.lot_setting import lot_setting
 from dzdesign.design.options import DesignOptions
@@ -39,7 +39,7 @@ def test_both_derivations_agree(example_valve, frequency_Hz):
     assert counted_dither(compensator) == compensator.dither_reserve_counts
     assert (counted_dither(compensator) == 0) == (frequency_Hz == 156.25)
     assert margin_of(compensator).exceeded == 0
-    prove_certificates(compensator)
+    assert with_certificates(compensator) == compensator
 
 
 def test_the_offset_is_that_without_a_dither_where_the_bounds_have_it(example_valve):
@@ -65,8 +65,8 @@ def test_a_design_that_keeps_nothing_free_is_seen(example_valve, monkeypatch, fr
 def test_a_compensator_that_is_edited_to_another_dither_is_refused(example_valve):
     made = design(under(example_valve, 156.25), OPTIONS)
     larger = replace(made, drive_functions=replace(made.drive_functions, dither_counts=900))
-    with pytest.raises(InputError):
-        prove_certificates(larger)
+    with pytest.raises(RequirementError):
+        with_certificates(larger)
 
 
 def test_the_header_says_whose_dither_the_bound_has(example_valve, wording):

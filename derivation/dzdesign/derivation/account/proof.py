@@ -85,16 +85,15 @@ def prove(statements: Sequence[Statement], hear: Hear | None = None) -> tuple[Ve
     Raises
     ------
     RequirementError
-        If a number appears twice, or a statement rests on itself, on a later one, on an unknown one, or on a
-        copy of itself. As each statement rests on earlier ones only, no chain of premises can be circular.
+        If a number appears twice, or a statement rests on what is not stated before it, or on a copy of itself. As
+        each statement rests on earlier ones only, no chain of premises can be circular.
     """
     earlier: dict[str, Statement] = {}
     verdicts: dict[str, Verdict] = {}
-    order = [statement.number for statement in statements]
     for statement in statements:
         if statement.number in earlier:
             raise RequirementError(f"{statement.number} is stated twice")
-        check_grounds(statement, earlier, order)
+        check_grounds(statement, earlier)
         verdict, error = judge(statement, earlier, verdicts), statement.unit_error()
         # What does not follow may be wrong in its units too, nothing else may.
         verdict = replace(verdict, unit_error=error, as_expected=verdict.as_expected and not (error and verdict.holds))
@@ -105,20 +104,14 @@ def prove(statements: Sequence[Statement], hear: Hear | None = None) -> tuple[Ve
     return tuple(verdicts.values())
 
 
-def check_grounds(statement: Statement, earlier: Mapping[str, Statement], order: Sequence[str]) -> None:
-    """Raise `RequirementError` if a statement rests on itself, a later one, an unknown one, or a copy of itself."""
+def check_grounds(statement: Statement, earlier: Mapping[str, Statement]) -> None:
+    """Raise `RequirementError` if a statement rests on what is not stated before it, or on a copy of itself."""
     if statement.kind.is_given == bool(statement.grounds):
         wanted = "has no" if statement.kind.is_given else "needs"
         raise RequirementError(f"{statement.number}: a statement of kind {statement.kind} {wanted} grounds")
     for ground in statement.grounds:
-        if ground.number == statement.number:
-            raise RequirementError(f"{statement.number} is its own premise")
-        if ground.number in order and ground.number not in earlier:
-            raise RequirementError(
-                f"{statement.number} rests on {ground.number}, which stands after it: that may be circular"
-            )
         if ground.number not in earlier:
-            raise RequirementError(f"{statement.number} rests on {ground.number}, which is not stated")
+            raise RequirementError(f"{statement.number} rests on {ground.number}, which is not stated before it")
         # A tie between `law.py` and the paper compares two transcriptions, so there a copy is the point.
         # A special case of an earlier statement is a result; the statement itself is not.
         premise = earlier[ground.number]

@@ -6,7 +6,6 @@ from itertools import product
 from math import log, sqrt
 from typing import Annotated, NamedTuple
 
-import numpy as np
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError, quantity
@@ -131,11 +130,6 @@ class CurrentSampling:
         """Length of a PWM period."""
         return 1 / self.tick_Hz
 
-    @property
-    def delay_s(self) -> float:
-        """From the middle of the samples to the middle of the period in which the output acts."""
-        return (1.5 - (self.before / self.samples - 0.5)) * self.period_s
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CurrentSensor:
@@ -153,22 +147,6 @@ class CurrentSensor:
             raise RuleError(
                 "the current's sensor needs a positive gain, an offset of zero or more, a divider below one"
             )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SensorLine:
-    """The straight lines from a current, and from the supply's voltage, to a code before it is rounded down."""
-
-    V_per_A: float
-    offset_V: float
-    codes_per_V: float
-    code_max: int
-    supply_divider: float
-
-    def codes(self, volts: np.ndarray) -> np.ndarray:
-        """Return the codes of voltages at the pin."""
-        rounded: np.ndarray = np.clip(np.floor(volts * self.codes_per_V), 0, self.code_max)
-        return rounded
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -19,12 +19,12 @@ from dzdesign.design.current.circuit import (
     CurrentLoop,
     CurrentSampling,
     CurrentSensor,
-    SensorLine,
     SupplyCorrection,
 )
 from dzdesign.design.current.responses import (
     SEARCH_GRID,
     STEP_S,
+    CurrentRequest,
     Gains,
     StepResponse,
     dither_departure,
@@ -91,16 +91,9 @@ def choose_gains(circuit: CoilCircuit, sampling: CurrentSampling, supply_measure
     return gains(low)
 
 
-def choose_loop(
-    circuit: CoilCircuit,
-    sensor: CurrentSensor,
-    converter: Converter,
-    sampling: CurrentSampling,
-    *,
-    compare_max: int,
-    compare_limit: int | None = None,
-) -> CurrentLoop:
+def choose_loop(asked: CurrentRequest, compare_max: int) -> CurrentLoop:
     """Return the current loop in integers; a coil or a sensor that allows none is an `InputError`."""
+    circuit, sensor, converter, sampling = asked.circuit, asked.sensor, asked.converter, asked.sampling
     if circuit.duty(circuit.nominal, circuit.rated_A) >= 1:
         raise InputError(
             f"the coil carries at most {circuit.nominal_V / circuit.nominal.resistance_ohm:.3g} A at "
@@ -137,7 +130,7 @@ def choose_loop(
     loop = CurrentLoop(
         full_counts=compare_max,
         rate=min(compare_max, 65535),
-        compare_limit=compare_max if compare_limit is None else compare_limit,
+        compare_limit=compare_max,
         samples=samples,
         current_gain=current_gain,
         current_shift=current_shift,
@@ -156,26 +149,14 @@ def choose_loop(
         open_ticks=ceil(OPEN_PATIENCE * slowest_s * log(OPEN_TIMES / (OPEN_TIMES - 1)) * sampling.tick_Hz),
         supply=_supply_correction(circuit, sensor, converter),
     )
-    line = sensor_line(sensor, converter)
-    return _with_release(_with_rate(loop, circuit, sampling, line), circuit, sampling, line)
+    return _with_release(_with_rate(loop, asked), asked)
 
 
-def sensor_line(sensor: CurrentSensor, converter: Converter) -> SensorLine:
-    """Return the codes of a current and of a supply."""
-    return SensorLine(
-        V_per_A=sensor.V_per_A,
-        offset_V=sensor.offset_V,
-        codes_per_V=converter.levels / float(converter.full_V),
-        code_max=converter.code_max,
-        supply_divider=sensor.supply_divider,
-    )
-
-
-def _with_rate(loop: CurrentLoop, circuit: CoilCircuit, sampling: CurrentSampling, line: SensorLine) -> CurrentLoop:
+def _with_rate(loop: CurrentLoop, asked: CurrentRequest) -> CurrentLoop:
     """Return the loop with the fastest set point whose step does not overshoot too far at any corner."""
     for periods in RATE_PERIODS:
         tried = replace(loop, rate=max(1, loop.full_counts // periods))
-        if worst_step(step_responses(tried, circuit, sampling, line, ends_only=True))[1].overshoot <= CHOSEN_OVERSHOOT:
+        if worst_step(step_responses(tried, asked, ends_only=True))[1].overshoot <= CHOSEN_OVERSHOOT:
             return tried
     raise InputError(
         f"the current overshoots by more than {CHOSEN_OVERSHOOT:.0%} however slowly the set point moves; declare "
@@ -183,7 +164,7 @@ def _with_rate(loop: CurrentLoop, circuit: CoilCircuit, sampling: CurrentSamplin
     )
 
 
-def _with_release(loop: CurrentLoop, circuit: CoilCircuit, sampling: CurrentSampling, line: SensorLine) -> CurrentLoop:
+def _with_release(loop: CurrentLoop, asked: CurrentRequest) -> CurrentLoop:
     """Return the loop whose output begins low enough that no current overshoots as the drive is released.
 
     What the integral takes up on the way would carry the current past the offset, where the valve opens. It comes up
@@ -191,21 +172,21 @@ def _with_release(loop: CurrentLoop, circuit: CoilCircuit, sampling: CurrentSamp
     taken, and `CurrentDrive.release_overshoot_A` says what is left.
     """
     unit = max((1 << (loop.full_counts.bit_length() - 1)) // 64, 1)
-    allowed_A = allowed_at_release_A(line)
+    allowed_A = allowed_at_release_A(asked)
     low, high = -1, len(RELEASES) - 1
     while high - low > 1:
         middle = (low + high) // 2
         tried = replace(loop, release=RELEASES[middle] * unit)
-        if released_overshoot_A(tried, circuit, sampling, line) <= allowed_A:
+        if released_overshoot_A(tried, asked) <= allowed_A:
             high = middle
         else:
             low = middle
     return replace(loop, release=RELEASES[high] * unit)
 
 
-def allowed_at_release_A(line: SensorLine) -> float:
+def allowed_at_release_A(asked: CurrentRequest) -> float:
     """Return the overshoot of a release that is none: what the sensor does not show."""
-    return RELEASED_CODES / (line.V_per_A * line.codes_per_V)
+    return RELEASED_CODES / (asked.sensor.V_per_A * asked.codes_per_V)
 
 
 def worst_step(steps: Sequence[StepResponse]) -> tuple[StepResponse, StepResponse]:
@@ -352,37 +333,24 @@ def _ends(factors: tuple[float, float]) -> str:
     return f"{factors[0]:g}..{factors[1]:g}"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CurrentRequest:
-    """What an engineer declares for current control."""
-
-    circuit: CoilCircuit
-    sensor: CurrentSensor
-    sampling: CurrentSampling
-
-
-def design_current_drive(
-    request: CurrentRequest, converter: Converter, compare_max: int, dither: tuple[int, int] = (0, 1)
-) -> CurrentDrive:
+def design_current_drive(asked: CurrentRequest, compare_max: int, dither: tuple[int, int] = (0, 1)) -> CurrentDrive:
     """Choose the loop of a coil, and compute what it holds; a dither has a peak, counts, and periods of half a wave."""
-    circuit, sensor, sampling = request.circuit, request.sensor, request.sampling
-    loop = choose_loop(circuit, sensor, converter, sampling, compare_max=compare_max)
-    phase, gain = worst_margins(circuit, sampling, gains_of(loop, circuit))
-    line = sensor_line(sensor, converter)
-    slowest, largest = worst_step(step_responses(loop, circuit, sampling, line))
+    circuit, loop = asked.circuit, choose_loop(asked, compare_max)
+    phase, gain = worst_margins(circuit, asked.sampling, gains_of(loop, circuit))
+    slowest, largest = worst_step(step_responses(loop, asked))
     if not isfinite(slowest.rise_s):
         raise InputError(
             f"with {slowest.corner.resistance_ohm:.3g} ohm and {slowest.corner.inductance_H:.3g} H at "
             f"{slowest.corner.supply_V:.3g} V the current does not reach 90 % of the rated one in {1e3 * STEP_S:g} ms; "
             "declare narrower ranges of coil and supply, or a lower --rated-current"
         )
-    released_A = released_overshoot_A(loop, circuit, sampling, line)
-    above, below = dither_departure(loop, circuit, sampling, line, counts=dither[0], ticks=dither[1])
+    released_A = released_overshoot_A(loop, asked)
+    above, below = dither_departure(loop, asked, counts=dither[0], ticks=dither[1])
     high, low = 0.9 * circuit.rated_A, 0.1 * circuit.rated_A
     return CurrentDrive(
         circuit=circuit,
-        sensor=sensor,
-        sampling=sampling,
+        sensor=asked.sensor,
+        sampling=asked.sampling,
         loop=loop,
         phase_margin_deg=round(phase.phase_deg, 3),
         gain_margin=round(gain.gain, 4),
@@ -390,7 +358,7 @@ def design_current_drive(
         least_rise_s=round(slowest.least_s, 9),
         fall_s=round(max(circuit.fastest_fall_s(corner, high, low) for corner in circuit.corners()), 9),
         overshoot=round(largest.overshoot, 6),
-        release_overshoot_A=round(released_A, 9) if released_A > allowed_at_release_A(line) else 0.0,
+        release_overshoot_A=round(released_A, 9) if released_A > allowed_at_release_A(asked) else 0.0,
         dither_above_counts=above,
         dither_below_counts=below,
     )

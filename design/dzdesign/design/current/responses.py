@@ -17,14 +17,35 @@ from dzdesign.design.current.circuit import (
     Corner,
     CurrentLoop,
     CurrentSampling,
-    SensorLine,
+    CurrentSensor,
 )
+from dzdesign.design.target_inputs import Converter
 
 #: Frequencies that are looked at, up to half the PWM's.
 GRID, SEARCH_GRID = 4_000, 600
 LOWEST_RAD_S = 0.1
 #: Currents at which margins are taken, over the rated one: the pulse's edge lies elsewhere at each.
 OPERATING_CURRENTS = (0.1, 0.25, 0.5, 0.75, 1.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CurrentRequest:
+    """What an engineer declares for current control, and the converter that samples it."""
+
+    circuit: CoilCircuit
+    sensor: CurrentSensor
+    sampling: CurrentSampling
+    converter: Converter
+
+    @property
+    def codes_per_V(self) -> float:
+        """Codes for a volt at the pin, before they are rounded down."""
+        return self.converter.levels / float(self.converter.full_V)
+
+    def codes(self, volts: np.ndarray) -> np.ndarray:
+        """Return the codes of voltages at the pin."""
+        rounded: np.ndarray = np.clip(np.floor(volts * self.codes_per_V), 0, self.converter.code_max)
+        return rounded
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -172,25 +193,24 @@ class Coils:
 
 def run_loop(
     loop: CurrentLoop,
-    circuit: CoilCircuit,
+    asked: CurrentRequest,
     corners: Sequence[Corner],
-    sampling: CurrentSampling,
-    sensor: SensorLine,
     set_points: Sequence[int | np.ndarray] | np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return mean current in A and compare value, (periods, corners), over a set point above zero for each period.
 
     A set point may be one for each corner, (corners,).
     """
-    coils, unit = Coils(circuit, corners, sampling), float(1 << loop.gain_shift)
+    sampling, sensor = asked.sampling, asked.sensor
+    coils, unit = Coils(asked.circuit, corners, sampling), float(1 << loop.gain_shift)
     count, before = len(corners), sampling.before
     integral, compare, ramped = np.zeros(count), np.zeros(count), np.zeros(count)
-    factor = _correction(loop, sensor.codes(coils.supply * sensor.supply_divider))
-    last = np.full((sampling.samples, count), sensor.codes(np.array(sensor.offset_V)))
+    factor = _correction(loop, asked.codes(coils.supply * sensor.supply_divider))
+    last = np.full((sampling.samples, count), asked.codes(np.array(sensor.offset_V)))
     means, compares = [], []
     for set_point in set_points:
         currents, mean = coils.period(compare / loop.full_counts)
-        codes = sensor.codes(sensor.offset_V + currents * sensor.V_per_A)
+        codes = asked.codes(sensor.offset_V + currents * sensor.V_per_A)
         means.append(mean)
         compares.append(compare)
         total = codes[:before].sum(axis=0) + last[before:].sum(axis=0)
@@ -198,11 +218,11 @@ def run_loop(
         ramped = ramped + np.clip(set_point - ramped, -loop.rate, loop.rate)
         above = np.maximum(total - loop.offset_nominal, 0)
         error = ramped - np.floor(above * loop.current_gain / (1 << loop.current_shift) + 0.5)
-        asked = integral - loop.release * unit + loop.proportional * error + loop.feed_forward * ramped
-        counts = np.floor(np.maximum(asked, 0) / unit + 0.5)
+        wanted = integral - loop.release * unit + loop.proportional * error + loop.feed_forward * ramped
+        counts = np.floor(np.maximum(wanted, 0) / unit + 0.5)
         if loop.supply is not None:
             counts = np.floor(np.minimum(counts, 65535) * factor / (1 << CORRECTION_SHIFT) + 0.5)
-        held = ((counts > loop.compare_limit) & (error > 0)) | ((asked < 0) & (error < 0))
+        held = ((counts > loop.compare_limit) & (error > 0)) | ((wanted < 0) & (error < 0))
         end = loop.integral_limit * unit
         integral = np.where(held, integral, np.clip(integral + loop.integral * error, -end, end))
         compare = np.minimum(counts, loop.compare_limit)
@@ -220,16 +240,15 @@ def _correction(loop: CurrentLoop, codes: np.ndarray) -> np.ndarray:
     return factor
 
 
-def step_responses(
-    loop: CurrentLoop, circuit: CoilCircuit, sampling: CurrentSampling, sensor: SensorLine, *, ends_only: bool = False
-) -> list[StepResponse]:
+def step_responses(loop: CurrentLoop, asked: CurrentRequest, *, ends_only: bool = False) -> list[StepResponse]:
     """Return the step up at every corner that can carry the rated current."""
+    circuit, sampling = asked.circuit, asked.sampling
     corners = circuit.end_corners() if ends_only else circuit.corners()
     able = [corner for corner in corners if circuit.duty(corner, circuit.rated_A) < 1]
     low, high = (share * circuit.rated_A for share in STEP)
     settle, step = (round(seconds * sampling.tick_Hz) for seconds in (SETTLE_S, STEP_S))
     counts = [round(share * loop.full_counts) for share in STEP]
-    means, _ = run_loop(loop, circuit, able, sampling, sensor, [counts[0]] * settle + [counts[1]] * step)
+    means, _ = run_loop(loop, asked, able, [counts[0]] * settle + [counts[1]] * step)
     after = means[settle:]
     found = []
     for place, corner in enumerate(able):
@@ -245,18 +264,17 @@ def step_responses(
     return found
 
 
-def released_overshoot_A(
-    loop: CurrentLoop, circuit: CoilCircuit, sampling: CurrentSampling, sensor: SensorLine
-) -> float:
+def released_overshoot_A(loop: CurrentLoop, asked: CurrentRequest) -> float:
     """Return how far the mean current of a period gets past the set point it is released to, at most; all corners."""
+    circuit = asked.circuit
     tried = [
         (corner, share)
         for corner, share in product(circuit.corners(), RELEASED)
         if circuit.duty(corner, share * circuit.rated_A) < 1
     ]
     counts = np.round(np.array([share for _, share in tried]) * loop.full_counts)
-    periods = round(RELEASED_S * sampling.tick_Hz)
-    means, _ = run_loop(loop, circuit, [corner for corner, _ in tried], sampling, sensor, [counts] * periods)
+    periods = round(RELEASED_S * asked.sampling.tick_Hz)
+    means, _ = run_loop(loop, asked, [corner for corner, _ in tried], [counts] * periods)
     return float((means - counts / loop.full_counts * circuit.rated_A).max())
 
 
@@ -265,30 +283,22 @@ SHARES = (0.25, 0.5, 0.75)
 SETTLED_S, SEEN_S = 0.2, 0.1
 
 
-def dither_departure(
-    loop: CurrentLoop,
-    circuit: CoilCircuit,
-    sampling: CurrentSampling,
-    sensor: SensorLine,
-    *,
-    counts: int,
-    ticks: int,
-) -> tuple[int, int]:
+def dither_departure(loop: CurrentLoop, asked: CurrentRequest, *, counts: int, ticks: int) -> tuple[int, int]:
     """Return by how many counts the current's peak lies above the set point's at most, and below it at most.
 
     The certificate keeps the dither's peak free under the threshold: of a controlled current its own, which overshoots
     the wave's steps or does not reach their top, the largest mean of a PWM period at the worst corner. Both are 0 or
     more; `counts` is the wave's peak, `ticks` the PWM periods of half of it.
     """
-    above, below = [0.0], [0.0]
+    circuit, above, below = asked.circuit, [0.0], [0.0]
     for share in SHARES if counts else ():
         set_point, tops = round(share * loop.full_counts), (share + counts / loop.full_counts) * circuit.rated_A
         able = [corner for corner in circuit.corners() if circuit.duty(corner, tops) < 1]
         if not able or not counts < set_point <= loop.full_counts - counts:
             continue
-        settled, seen = (round(seconds * sampling.tick_Hz) for seconds in (SETTLED_S, SEEN_S))
+        settled, seen = (round(seconds * asked.sampling.tick_Hz) for seconds in (SETTLED_S, SEEN_S))
         wave = _wave(set_point, counts, ticks, settled + seen)
-        means, _ = run_loop(loop, circuit, able, sampling, sensor, wave)
+        means, _ = run_loop(loop, asked, able, wave)
         peaks = means[settled:].max(axis=0) * loop.full_counts / circuit.rated_A - set_point - counts
         above.append(float(peaks.max()))
         below.append(float(-peaks.min()))
