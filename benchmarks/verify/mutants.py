@@ -8,7 +8,7 @@ from time import perf_counter
 from firmware import example_firmware
 from scoreboard import Row, print_rows, say
 
-from dzdesign.verify.analysis.mutation import MutationBench, all_mutants, judge_all, mutation_score
+from tests.support.core_mutants import MutationBench, all_mutants, judge_all, mutation_score
 
 QUICK = 60
 

@@ -12,7 +12,7 @@ EXAMPLES = (
     "dzdesign verify plc -o plc_evidence",
     "dzdesign verify firmware --tolerances machines.toml",
     'dzdesign verify calibrated/lot/firmware --blocks "calibrated/valves/*/calibration.bin"',
-    "dzdesign verify firmware --machine-code --mutate --proof",
+    "dzdesign verify firmware --machine-code",
 )
 
 

@@ -25,9 +25,7 @@ if TYPE_CHECKING:
     from dzdesign.verify.verification import Verification
 
 #: Options that make no sense for an output other than a C firmware, unless its kind takes one.
-OF_FIRMWARE = (
-    "blocks", "plant", "back_pressure", "tolerances", "include", "c2000ware", "mutate", "machine_code", "proof",
-)  # fmt: skip
+OF_FIRMWARE = ("blocks", "plant", "back_pressure", "tolerances", "include", "c2000ware", "machine_code")
 #: No port behind a valve's edge has more.
 LARGEST_BACK_MPA = 100.0
 
@@ -59,12 +57,8 @@ class VerifyArguments:
     """Folder of headers for your board files, such as those of your chip. Repeatable."""
     c2000ware: Annotated[AnyPath | None, Option("DIR", CHECKS)] = None
     """Folder of your C2000Ware. The f28335 firmware is then compiled against its headers too."""
-    mutate: Annotated[bool, Option(group=CHECKS)] = False
-    """Insert a fault at every place of the C code, one at a time, and count the faults that are detected."""
     machine_code: Annotated[bool, Option(group=CHECKS)] = False
     """Check machine code too. The Cortex-M4 runs every input in QEMU, and the AVR a sample in simavr."""
-    proof: Annotated[bool, Option(group=CHECKS)] = False
-    """Prove with Frama-C that nothing overflows a 16-bit int."""
 
 
 def verify(arguments: VerifyArguments) -> "Verification | OutputVerification":
@@ -173,8 +167,6 @@ def _verify_code(
             include=[Path(place) for place in paths_of(arguments.include)],
             c2000ware=None if arguments.c2000ware is None else Path(arguments.c2000ware),
             machine_code=arguments.machine_code,
-            proof=arguments.proof,
-            mutate=arguments.mutate,
             ramps=partial(ramps, stage) if ramps else None,
             blocks=of_blocks if blocks else None,
         )

@@ -8,11 +8,11 @@ import pytest
 from dzdesign.design.current.circuit import CoilCircuit, CurrentSensor
 from dzdesign.design.current.drive import choose_loop, gains_of
 from dzdesign.design.current.responses import Gains, margins
-from dzdesign.verify.analysis import machine_code
 from dzdesign.verify.current import corner_runs
 from dzdesign.verify.current.coil import CoilLoop, least_rise_s
 from dzdesign.verify.current.corner_runs import CURRENTS, stability_margins
 from dzdesign.verify.current.current_checks import current_checks
+from dzdesign.verify.exhaustive import machine_code
 from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4
 from tests.codegen.test_current_control import MEASURED, TEXTS
 from tests.support.evidence import verify

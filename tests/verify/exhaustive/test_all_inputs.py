@@ -12,10 +12,10 @@ import pytest
 
 from dzdesign.command_line.cli import main
 from dzdesign.core.errors import RequirementError
-from dzdesign.verify.analysis import machine_code
-from dzdesign.verify.analysis.machine_code import check_on_machine, machine_code_checks
+from dzdesign.verify.exhaustive import machine_code
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs, first_wrong, input_check
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
+from dzdesign.verify.exhaustive.machine_code import check_on_machine, machine_code_checks
 from dzdesign.verify.exhaustive.test_vectors import (
     DIRECTION,
     OUTSIDE,

@@ -67,7 +67,7 @@ def checks_of(rows: Sequence[Tried[Context]], context: Context) -> tuple[Check, 
 
 #: The front door designs and generates again; this room, which shares no code with it, compares.
 REPRODUCED = Requirement(id="reproduced", title="the files are reproduced from compensator.json")
-#: Of Structured Text and of a function for MATLAB.
+#: Of Structured Text, and `STATES` of a function for MATLAB too.
 OVERFLOW = Requirement(id="overflow", title="no operation leaves the range of its type")
 STATES = Requirement(id="states", title="status and what is remembered match their description")
 COMPILES = Requirement(id="compiles", title="compiles without warnings")
@@ -118,10 +118,6 @@ CALIBRATION_BLOCK = Requirement(
 MACHINE_CODE = Requirement(
     id="machine-code", title="machine code of other processors is right in simulators", how="`verify --machine-code`"
 )
-UNDEFINED_BEHAVIOUR = Requirement(
-    id="undefined-behaviour", title="no undefined behaviour with an int of 16 bits", how="`verify --proof`"
-)
-MUTATION = Requirement(id="mutation", title="the checks catch wrong C", how="`verify --mutate`")
 C2000WARE = Requirement(id="c2000ware", title="compiles against C2000Ware", how="`verify --c2000ware`")
 #: Of FMUs.
 FMU_VALID = Requirement(id="fmu-valid", title="FMPy finds no problem in the FMUs")

@@ -17,8 +17,6 @@ from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.design.pressure_inputs import not_covered
 from dzdesign.verify import requirements
-from dzdesign.verify.analysis import mutation
-from dzdesign.verify.analysis.machine_code import machine_code_checks, proof_check
 from dzdesign.verify.closed_loop.against_cvodes import compare_with_cvodes
 from dzdesign.verify.closed_loop.firmware_loop import FirmwareLoop, Watch, close_the_loop
 from dzdesign.verify.closed_loop.loop import RampSequence
@@ -34,10 +32,11 @@ from dzdesign.verify.compilation import (
     compiles_strictly,
 )
 from dzdesign.verify.current.current_checks import CurrentChecks, current_checks
-from dzdesign.verify.evidence import Evidence, InputCheck, MutationScore
+from dzdesign.verify.evidence import Evidence, InputCheck
 from dzdesign.verify.exhaustive.all_inputs import every_input, input_checks, lot_checked
 from dzdesign.verify.exhaustive.block_check import own_block_accepted
 from dzdesign.verify.exhaustive.drive_check import drive_follows
+from dzdesign.verify.exhaustive.machine_code import machine_code_checks
 from dzdesign.verify.folder import (
     Regenerated,
     as_generated,
@@ -77,8 +76,6 @@ class Asked:
     include: Sequence[Path] = ()
     c2000ware: Path | None = None
     machine_code: bool = False
-    proof: bool = False
-    mutate: bool = False
     #: With the ramp tests, and with the calibration blocks of other valves.
     ramps: FrontDoor | None = None
     blocks: FrontDoor | None = None
@@ -107,7 +104,6 @@ class Firmware:
     loop: FirmwareLoop = field(default_factory=FirmwareLoop)
     compared: tuple[PlantComparison, ...] = ()
     board_not_compiled: str = ""
-    mutants: MutationScore | None = None
 
     def is_as_generated(self) -> bool:
         """Tell whether more is tried than its text: of a folder that differs nothing else is."""
@@ -177,21 +173,6 @@ def _machine_code(firmware: Firmware) -> list[Check]:
     return machine_code_checks(firmware.code, firmware.inputs)
 
 
-def _proof(firmware: Firmware) -> list[Check]:
-    firmware.say("reading the core's C for all inputs, with Frama-C: some minutes")
-    return [proof_check(firmware.code)]
-
-
-def _mutants(firmware: Firmware) -> list[Check]:
-    bench = mutation.MutationBench(firmware.code)
-    mutants = mutation.all_mutants(bench)
-    firmware.say(f"checking the core with {len(mutants)} faults, one at a time")
-    bench.check_original()
-    judged = mutation.judge_all(bench, mutants, lambda work: firmware.watch(work, len(work)))
-    firmware.mutants = mutation.mutation_score(judged)
-    return [mutation.mutation_check(firmware.mutants)]
-
-
 def _asks(name: str) -> Callable[[Firmware], bool]:
     return lambda firmware: firmware.is_as_generated() and bool(getattr(firmware.asked, name))
 
@@ -223,8 +204,6 @@ REQUIREMENTS: tuple[Tried[Firmware], ...] = (
         _asks("blocks"),
     ),
     Tried((requirements.MACHINE_CODE,), _machine_code, _asks("machine_code")),
-    Tried((requirements.UNDEFINED_BEHAVIOUR,), _proof, _asks("proof")),
-    Tried((requirements.MUTATION,), _mutants, _asks("mutate")),
     Tried(
         (requirements.C2000WARE,),
         lambda each: [check_against_c2000ware(each.folder, each.asked.c2000ware or Path(), each.say)],
@@ -305,7 +284,6 @@ def verify(
         scenarios=firmware.loop.scenarios,
         population=firmware.loop.population,
         current_loop=firmware.current.result,
-        mutants=firmware.mutants,
         not_covered=not_covered(firmware.compensator),
     )
     derived = firmware.compensator if firmware.same and firmware.same.holds else None
