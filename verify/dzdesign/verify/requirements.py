@@ -138,9 +138,6 @@ DEAD_ZONES = Requirement(
     title="the stated dead zones are those of the file's law",
     how="`export`, `verify`",
 )
-LAW_DEAD_ZONES = Requirement(
-    id="amplifier-law-dead-zones", title="the dead zones stated beside them are those of the design"
-)
 POPULATION = Requirement(
     id="population",
     title="no flow at zero command for random machines within the tolerances",
