@@ -19,6 +19,12 @@ CALLS = ("dz_comp", "dz_drive_sample", "dz_drive_tick")
 #: Sections of an object that stay in flash; on the AVR data and constants are copied to RAM as well.
 IN_FLASH = re.compile(r"\.(?:text|rodata|data)\b")
 IN_RAM = {CORTEX_M4.name: re.compile(r"\.(?:data|bss)\b"), AVR.name: re.compile(r"\.(?:rodata|data|bss)\b")}
+#: Where a block lies that the program writes to; on the AVR with what copies it from flash to RAM at the start, which
+#: the compiler asks for and the assembler does not.
+BLOCK_SECTION = {
+    CORTEX_M4.name: '.section .rodata, "a", %progbits',
+    AVR.name: '.global __do_copy_data\n.section .data, "aw", @progbits',
+}
 VERSION = re.compile(r"\b\d+\.\d+\.\d+\b")
 
 
@@ -103,7 +109,7 @@ def _counted(machine: Machine, core: dict[str, bytes], objects: dict[str, Path],
     flags = (*machine.check_flags, f"-DBOTH={int(both)}", *(["-DDZ_BLOCK"] if block else []))
     linked = [*objects.values(), machine.compile(PROGRAM, sources, flags, what)]
     if block is not None:
-        linked.append(embedded(machine, "block", machine.block_section, block))
+        linked.append(embedded(machine, "block", BLOCK_SECTION[machine.name], block))
     printed = _counting(machine).run(machine.link(linked, what), [], what)
     expected = 10 if block is None else 22
     if len(printed) != 1 or len(printed[0]) != expected:

@@ -21,7 +21,7 @@ EVIDENCE = Evidence(
     tool=THIS_TOOL, made_from=(), target="f28335", changed_board_files=(), user_files=(), differing_files={},
     board_not_compiled="",
     checks=tuple(each.check(holds=True, text="yes") for each in ALWAYS), inputs=(), closed_loop=LOOP, scenarios=(),
-    population=None, current_loop=None,
+    current_loop=None,
 )  # fmt: skip
 
 

@@ -10,7 +10,6 @@ Arguments = VerifyArguments
 EXAMPLES = (
     "dzdesign verify firmware",
     "dzdesign verify plc -o plc_evidence",
-    "dzdesign verify firmware --tolerances machines.toml",
     'dzdesign verify calibrated/lot/firmware --blocks "calibrated/valves/*/calibration.bin"',
     "dzdesign verify firmware --machine-code",
 )

@@ -14,7 +14,7 @@ from dzdesign.core.verdicts import DOES_NOT_HOLD, NOT_CHECKED
 from dzdesign.design.design_choices import Above
 from dzdesign.design.firmware_manifest import FirmwareOrigin
 from dzdesign.verify.current.results import CurrentLoopResult
-from dzdesign.verify.loop_results import ClosedLoopResult, Count, Population, ScenarioResult, Side, about
+from dzdesign.verify.loop_results import ClosedLoopResult, Count, ScenarioResult, Side, about
 from dzdesign.verify.requirements import ALWAYS, AS_STATED, CURRENT_VALVE, OF_CURRENT, RAMPS, Check
 
 Sign = Literal[1, -1]
@@ -195,9 +195,6 @@ class Evidence(Artefact):
     closed_loop: Annotated[ClosedLoopResult, about("Result of the ramps in closed loop with the generated C.")]
     scenarios: Annotated[
         tuple[ScenarioResult, ...], about("Results of the scenarios in closed loop, other than ramps.")
-    ]
-    population: Annotated[
-        Population | None, about("Machines drawn from the declared budget, if --tolerances requested them.")
     ]
     current_loop: Annotated[
         CurrentLoopResult | None,

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
 from dzdesign.core.artefact_types import THIS_TOOL, Artefact, SourceFile, as_document, schema_of, to_json_bytes
-from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.core.errors import RequirementError
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.core.verdicts import NOT_ASKED_FOR, NOT_CHECKED
 from dzdesign.design.compensator import Compensator
@@ -21,16 +21,9 @@ from dzdesign.verify.closed_loop.against_cvodes import compare_with_cvodes
 from dzdesign.verify.closed_loop.firmware_loop import FirmwareLoop, Watch, close_the_loop
 from dzdesign.verify.closed_loop.loop import RampSequence
 from dzdesign.verify.closed_loop.plant import Plant
-from dzdesign.verify.closed_loop.population import NOT_DECLARED, Tolerances
 from dzdesign.verify.closed_loop.ramps import Curves, LoopComparison, csv_of, loop_curves
 from dzdesign.verify.closed_loop.scene import Scene, scenes_of
-from dzdesign.verify.compilation import (
-    board_compiles,
-    check_against_c2000ware,
-    check_include,
-    check_ware,
-    compiles_strictly,
-)
+from dzdesign.verify.compilation import board_compiles, check_include, compiles_strictly
 from dzdesign.verify.current.current_checks import CurrentChecks, current_checks
 from dzdesign.verify.evidence import Evidence, InputCheck
 from dzdesign.verify.exhaustive.all_inputs import every_input, input_checks, lot_checked
@@ -70,11 +63,8 @@ class Asked:
     #: The command over time, and the pressures downstream of the edge.
     sequence: RampSequence = field(default_factory=RampSequence)
     backs_MPa: Sequence[float] | None = None
-    #: How many machines are drawn from the declared budget.
-    tolerances: Tolerances | None = None
-    #: Folders with headers of the user's board files, and of C2000Ware.
+    #: Folders with headers of the user's board files.
     include: Sequence[Path] = ()
-    c2000ware: Path | None = None
     machine_code: bool = False
     #: With the ramp tests, and with the calibration blocks of other valves.
     ramps: FrontDoor | None = None
@@ -154,7 +144,7 @@ def _closed_loop(firmware: Firmware) -> Iterator[Check]:
     asked = firmware.asked
     scenes = firmware.scenes.result() if firmware.scenes else ()
     firmware.loop = close_the_loop(
-        scenes, firmware.compensator, asked.plant, asked.sequence, asked.tolerances, firmware.say, firmware.watch
+        scenes, firmware.compensator, asked.plant, asked.sequence, firmware.say, firmware.watch
     )
     firmware.curves = {**loop_curves(firmware.loop.loops), **firmware.curves}
     yield from firmware.loop.checks
@@ -204,11 +194,6 @@ REQUIREMENTS: tuple[Tried[Firmware], ...] = (
         _asks("blocks"),
     ),
     Tried((requirements.MACHINE_CODE,), _machine_code, _asks("machine_code")),
-    Tried(
-        (requirements.C2000WARE,),
-        lambda each: [check_against_c2000ware(each.folder, each.asked.c2000ware or Path(), each.say)],
-        lambda each: each.asked.c2000ware is not None,
-    ),
 )  # fmt: skip
 
 
@@ -266,7 +251,7 @@ def verify(
         folder=folder, again=again, code=code or folder, manifest=read_firmware_manifest(folder),
         compensator=read_compensator(folder), asked=asked, say=say, watch=watch,
     )  # fmt: skip
-    _refuse(firmware)
+    check_include(asked.include, firmware.manifest)
     host_compiler()
     checks = checks_of(REQUIREMENTS, firmware)
     manifest = firmware.manifest
@@ -282,22 +267,11 @@ def verify(
         inputs=firmware.inputs,
         closed_loop=firmware.loop.result(asked.plant, asked.plant_source, asked.plant_sha256, firmware.compared),
         scenarios=firmware.loop.scenarios,
-        population=firmware.loop.population,
         current_loop=firmware.current.result,
         not_covered=not_covered(firmware.compensator),
     )
     derived = firmware.compensator if firmware.same and firmware.same.holds else None
     return Verification(evidence=evidence, curves=firmware.curves, loops=firmware.loop.loops, derived=derived)
-
-
-def _refuse(firmware: Firmware) -> None:
-    """Refuse what is asked for and does not go with the firmware, or with what else is asked for."""
-    asked = firmware.asked
-    check_include(asked.include, firmware.manifest)
-    if asked.tolerances and firmware.compensator.machine is None:
-        raise InputError(NOT_DECLARED)
-    if asked.c2000ware is not None:
-        check_ware(firmware.folder, firmware.manifest, asked.c2000ware)
 
 
 def manifest_source(folder: Path) -> tuple[SourceFile]:
@@ -332,9 +306,7 @@ def untried_requirements(evidence: Evidence) -> tuple[Requirement, ...]:
         needed.BOARD_FILES: bool(evidence.board_not_compiled),
         needed.OWN_PLANT: evidence.closed_loop.plant is None,
         needed.LOAD_STEPS: not any(each.is_load_step for each in evidence.scenarios),
-        needed.POPULATION: evidence.population is None,
         needed.PRESSURE_INPUTS: len(evidence.inputs) > 1 and needed.PRESSURE_INPUTS.id not in tried,
-        needed.C2000WARE: evidence.target == "f28335" and needed.C2000WARE.id not in tried,
         needed.CALIBRATION_BLOCK: False,
     }
     for each in (each for row in REQUIREMENTS for each in row.requirements):

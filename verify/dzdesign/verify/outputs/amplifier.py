@@ -176,7 +176,8 @@ def _file_for(folder: Path, manifest: OutputManifest, device: str) -> bytes:
 
 def _table_of(content: bytes) -> dict[int, list[Stated]]:
     """Return what a table of dead zones states of the file, by the sign of command; the design's stands beside it."""
-    signs, tests = {name: sign for sign, name in SIDE_NAMES.items()}, dict[tuple[int, float], dict[str, float]]()
+    signs: dict[str, int] = {name: sign for sign, name in SIDE_NAMES.items()}
+    tests: dict[tuple[int, float], dict[str, float]] = {}
     try:
         for row in csv.DictReader(content.decode("ascii").splitlines()):
             place = signs[row["side"]], float(row["dp_MPa"])

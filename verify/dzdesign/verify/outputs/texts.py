@@ -26,9 +26,8 @@ from dzdesign.core.scratch import scratch_folder
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import OutputManifest
 from dzdesign.verify.evidence import OutputChecks, TriedInputs
-from dzdesign.verify.exhaustive.all_inputs import input_check, input_checks
-from dzdesign.verify.exhaustive.exact_law import ExactLaw
-from dzdesign.verify.exhaustive.test_vectors import PreparedInputs, differences
+from dzdesign.verify.exhaustive.all_inputs import core_checks
+from dzdesign.verify.exhaustive.test_vectors import differences
 from dzdesign.verify.exhaustive.zero_command import (
     PressureDrops,
     ZeroCommandMargin,
@@ -40,7 +39,6 @@ from dzdesign.verify.outputs.every_pair import EveryPair, Program, Tried
 from dzdesign.verify.outputs.exact_block import ExactBlock, PER_MPa
 from dzdesign.verify.outputs.text_values import Overflow, TextValues
 from dzdesign.verify.requirements import EXACT_LAW, FALLBACK, OVERFLOW, STATES, ZERO_COMMAND, Check
-from dzdesign.verify.toolchain.compiled_core import CompiledCore
 from dzdesign.verify.toolchain.machines import run_child
 
 Say = Callable[[str], None]
@@ -93,7 +91,7 @@ def function_checks(folder: Path, manifest: OutputManifest, compensator: Compens
     for sign in compensator.signals.signs:
         name = f"{FUNCTIONS[sign]}.m"
         say(f"comparing every input of {name}, in Octave, with the exact law")
-        parts += [function_in_octave(folder, sign, compensator, octave), _of_core(folder, compensator, sign)]
+        parts += [function_in_octave(folder, sign, compensator, octave), core_checks(folder, compensator, sign)]
     return OutputChecks(
         checks=tuple(check for part in parts for check in part.checks),
         inputs=tuple(each for part in parts for each in part.inputs),
@@ -114,16 +112,6 @@ def function_in_octave(folder: Path, sign: int, compensator: Compensator, octave
             return replace(found, checks=(*found.checks, _zero_command(function, every, 0, name)))
     except RequirementError as error:
         return OutputChecks(checks=(_named(EXACT_LAW.check(holds=False, text=str(error)), name),))
-
-
-def _of_core(folder: Path, compensator: Compensator, sign: int) -> OutputChecks:
-    """Try every input of the C code."""
-    core, prepared = CompiledCore(folder, sign), PreparedInputs(ExactLaw(compensator, sign))
-    found = input_check(prepared, core.sha256, core.check(prepared.everything()))
-    checks = input_checks(found, compensator.valve.recorded_units, both_signs=False)
-    tried = TriedInputs(name=f"core/{core.name}: codes, {found.side} commands", inputs=found.inputs, wrong=found.wrong,
-                        outputs_hash=found.outputs_hash)  # fmt: skip
-    return OutputChecks(checks=tuple(_named(each, f"core/{core.name}") for each in checks), inputs=(tried,))
 
 
 def _named(check: Check, what: str) -> Check:

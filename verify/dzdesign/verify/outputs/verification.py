@@ -57,7 +57,9 @@ def _is_a(target: str) -> Callable[[Given], bool]:
 
 
 OF_TEXTS = (requirements.EXACT_LAW, requirements.FALLBACK, requirements.STATES, requirements.ZERO_COMMAND)
-OF_FMUS = (requirements.FMU_DRIVE, requirements.FMU_UNITS, requirements.FMU_CLOSED_LOOP)
+OF_FMUS = (
+    requirements.FMU_LAW, requirements.FMU_DRIVE, requirements.FMU_UNITS, requirements.FMU_CLOSED_LOOP,
+)  # fmt: skip
 OF_AMPLIFIERS = (requirements.READ_BACK, requirements.SAFE, requirements.DEAD_ZONES)
 #: Target, as the manifest names it, to what its checks are of, and the checks.
 KINDS = {
