@@ -74,9 +74,6 @@ def test_what_was_generated_holds(written, name, given):
 @pytest.mark.parametrize(
     ("of", "name", "old", "new", "wrong"),
     [
-        (WEST, "west.txt", "MIN:A 4956", "MIN:A 4966", SAFE),
-        (WEST, "west.txt", "MIN:A 4956", "MIN:A 4856", DEAD_ZONES),
-        (WEST, "west.txt", "MIN:A 4956", "MIN 4956", READ_BACK),
         (WEST, TABLE, "positive,1.000000,opening", "positive,2.000000,opening", DEAD_ZONES),
         (WEST, TABLE, "positive,1.000000,opening", "negative,1.000000,opening", DEAD_ZONES),
         (WEST, TABLE, "positive,1.000000,opening", "positive,1.000000,closing", DEAD_ZONES),

@@ -18,7 +18,6 @@ from dzdesign.verify.toolchain.host_compiler import (
     check_strictly,
     find_compilers,
     first_error,
-    keeps_warnings,
     name_of,
     run_compiler,
 )  # fmt: skip
@@ -33,9 +32,6 @@ ELSEWHERE = re.compile(r"error: (\S+): No such file or directory")
 def compiles_strictly(folder: Path, manifest: FirmwareManifest) -> Check:
     """Tell whether every compiler on this machine takes the core with every warning an error."""
     compilers = find_compilers()
-    if silent := [name_of(compiler) for compiler in compilers if keeps_warnings(compiler)]:
-        text = f"{silent[0]} takes C that these options must refuse, so what it says of the core means nothing"
-        return requirements.COMPILES.check(holds=None, text=f"{text}; take options such as -w out of $CC")
     try:
         for compiler in compilers:
             for name in manifest.core:
