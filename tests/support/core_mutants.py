@@ -15,8 +15,7 @@ what the original's return. Otherwise it survives.
 
 import os
 import re
-from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -103,26 +102,6 @@ class MutantOutcome:
     change: str
     verdict: str
     killer: str = ""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MutationScore:
-    """How many wrong versions of the C there are, how many the checks caught, and what is left."""
-
-    mutants: int
-    killed: int
-    refused: int
-    same_object: int
-    same_outputs: int
-    survived: int
-    #: By the check that caught them.
-    killers: Mapping[str, int]
-    not_killed: tuple[MutantOutcome, ...]
-
-    @property
-    def holds(self) -> bool:
-        """True if the checks caught some, and all that are not equivalent."""
-        return self.survived == 0 and self.killed > 0
 
 
 KILLED, REFUSED, SAME_OBJECT, SAME_OUTPUTS, SURVIVED = (
@@ -215,18 +194,3 @@ def judge_all(bench: MutationBench, mutants: Sequence[Mutant]) -> list[MutantOut
     """Judge mutants on all processors."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         return list(pool.map(bench.judge, mutants))
-
-
-def mutation_score(outcomes: Sequence[MutantOutcome]) -> MutationScore:
-    """Return the counts, and by name what was not killed and why."""
-    count = Counter(each.verdict for each in outcomes)
-    return MutationScore(
-        mutants=len(outcomes),
-        killed=count[KILLED],
-        refused=count[REFUSED],
-        same_object=count[SAME_OBJECT],
-        same_outputs=count[SAME_OUTPUTS],
-        survived=count[SURVIVED],
-        killers=dict(Counter(each.killer for each in outcomes if each.killer)),
-        not_killed=tuple(each for each in outcomes if each.verdict != KILLED),
-    )

@@ -2,6 +2,7 @@
 
 import random
 import shutil
+from collections import Counter
 
 import pytest
 
@@ -22,7 +23,6 @@ from tests.support.core_mutants import (
     all_mutants,
     judge_all,
     mutants_of,
-    mutation_score,
 )
 from tests.support.golden_firmware import FULL, GOLDENS, INPUT, generated, write
 from tests.support.synthetic import needs_compiler
@@ -118,9 +118,6 @@ JUDGED = [
 def test_a_verdict_is_given_where_it_is_due(plain, file, old, new, verdict):
     outcome = plain.judge(edited(plain, file, old, new))
     assert outcome.verdict == verdict, outcome
-    score = mutation_score([outcome, plain.judge(edited(plain, *JUDGED[0][:3]))])
-    assert score.holds
-    assert [row.verdict for row in score.not_killed] == ([] if verdict == KILLED else [verdict])
 
 
 @pytest.mark.slow
@@ -132,7 +129,6 @@ def test_a_fault_that_no_converter_shows_survives(plain):
     text += "    return (uint16_t)(right(u_adc, p_a_adc, p_b_adc) ^ beyond);\n}\n"
     outcome = plain.judge(Mutant(file="dz_comp.c", line=1, change="beyond", text=text))
     assert outcome.verdict == SURVIVED
-    assert not mutation_score([outcome, plain.judge(edited(plain, *JUDGED[0][:3]))]).holds
 
 
 @pytest.mark.slow
@@ -141,10 +137,11 @@ def test_a_part_of_all_mutants_is_killed_or_equivalent(name, request):
     bench = request.getfixturevalue(name)
     every = all_mutants(bench)
     assert {mutant.file for mutant in every} >= {"dz_comp.c", "dz_comp.h", "dz_drive.c"} and len(every) > 300
-    score = mutation_score(judge_all(bench, random.Random(SEED).sample(every, TRIED)))
-    assert score.survived == 0 and score.refused == 0
-    assert score.killed >= 0.6 * TRIED  # a number that a design leaves at 0 has mutants with the same outputs
-    assert sum(score.killers.values()) == score.killed
+    outcomes = judge_all(bench, random.Random(SEED).sample(every, TRIED))
+    found = Counter(each.verdict for each in outcomes)
+    assert found[SURVIVED] == 0 and found[REFUSED] == 0
+    assert found[KILLED] >= 0.6 * TRIED  # a number that a design leaves at 0 has mutants with the same outputs
+    assert all(bool(each.killer) == (each.verdict == KILLED) for each in outcomes)
 
 
 def test_a_negative_side_and_the_drive_of_both_have_their_killers(full):

@@ -1,4 +1,4 @@
-"""Evidence of the closed loop: ramps, scenarios and drawn machines, as ``verification.json`` holds them."""
+"""Evidence of the closed loop: ramps and scenarios, as ``verification.json`` holds them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -102,41 +102,6 @@ class PressureResult(AtZero):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PlantComparison:
-    """Comparison of the closed loop's plant with CasADi's CVODES over one time window: a ramp, steps and load steps."""
-
-    side: Side
-    dp_MPa: Annotated[
-        tuple[float, float], quantity("MPa", "Lowest and highest pressure drop at no flow.")
-    ]
-    seconds: Annotated[float, quantity("s", "Length of the window.", gt=0, le=1000)]
-    step_s: Annotated[
-        float,
-        quantity("s", "Longest step of the plant, which follows from its fastest time constant.", gt=0, le=1),
-    ]
-    position_difference: Annotated[
-        float,
-        quantity(
-            "1",
-            "Largest difference of the spool positions at the ends of PWM periods, relative to the stroke.",
-            ge=0,
-            le=1e6,
-        ),
-    ]
-    flow_difference: Annotated[
-        float,
-        quantity(
-            "1",
-            "Largest difference of the flows at the ends of PWM periods, relative to the largest one in the window.",
-            ge=0,
-            le=1e6,
-        ),
-    ]
-    q_largest_L_min: Annotated[Flow, about("Largest flow in the window, by CVODES.")]
-    impacts: Annotated[Count, about("Number of times the spool hit a stop, by CVODES.")]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class ClosedLoopResult:
     """Ramps in closed loop with the generated C."""
 
@@ -159,9 +124,6 @@ class ClosedLoopResult:
     pressures: Annotated[
         tuple[PressureResult, ...],
         about("Result for each side and tested pressure drop; empty if the closed loop did not run."),
-    ]
-    against_cvodes: Annotated[
-        tuple[PlantComparison, ...], about("Comparison for each side; empty if it did not run.")
     ]
 
 

@@ -40,7 +40,6 @@ from dzdesign.verify.folder import (
     reproduced,
     user_files,
 )
-from dzdesign.verify.loop_results import PlantComparison
 from dzdesign.verify.requirements import EVERY_RUN, OF_SOME, Check, Requirement, Tried, checks_of
 from dzdesign.verify.toolchain.host_compiler import host_compiler
 
@@ -92,7 +91,6 @@ class Firmware:
     curves: dict[str, Curves] = field(default_factory=dict)
     current: CurrentChecks = field(default_factory=CurrentChecks)
     loop: FirmwareLoop = field(default_factory=FirmwareLoop)
-    compared: tuple[PlantComparison, ...] = ()
     board_not_compiled: str = ""
 
     def is_as_generated(self) -> bool:
@@ -148,8 +146,7 @@ def _closed_loop(firmware: Firmware) -> Iterator[Check]:
     )
     firmware.curves = {**loop_curves(firmware.loop.loops), **firmware.curves}
     yield from firmware.loop.checks
-    firmware.compared, native_plant = compare_with_cvodes(scenes, firmware.say)
-    yield native_plant
+    yield compare_with_cvodes(scenes, firmware.say)
 
 
 def _board(firmware: Firmware) -> Sequence[Check]:
@@ -265,7 +262,7 @@ def verify(
         board_not_compiled=firmware.board_not_compiled,
         checks=checks,
         inputs=firmware.inputs,
-        closed_loop=firmware.loop.result(asked.plant, asked.plant_source, asked.plant_sha256, firmware.compared),
+        closed_loop=firmware.loop.result(asked.plant, asked.plant_source, asked.plant_sha256),
         scenarios=firmware.loop.scenarios,
         current_loop=firmware.current.result,
         not_covered=not_covered(firmware.compensator),

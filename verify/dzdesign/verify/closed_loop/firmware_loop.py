@@ -12,7 +12,7 @@ from dzdesign.verify.closed_loop.plant import Plant
 from dzdesign.verify.closed_loop.ramps import LoopComparison, compare_at_pressure
 from dzdesign.verify.closed_loop.scenarios import run_scenarios
 from dzdesign.verify.closed_loop.scene import Scene
-from dzdesign.verify.loop_results import ClosedLoopResult, PlantComparison, ScenarioResult
+from dzdesign.verify.loop_results import ClosedLoopResult, ScenarioResult
 from dzdesign.verify.requirements import Check
 
 #: Shows how far a stage is: pieces and their number in, the pieces out.
@@ -32,9 +32,7 @@ class FirmwareLoop:
     loops: tuple[LoopComparison, ...] = ()
     scenarios: tuple[ScenarioResult, ...] = ()
 
-    def result(
-        self, plant: Plant | None, source: str, sha256: str | None, against_cvodes: tuple[PlantComparison, ...]
-    ) -> ClosedLoopResult:
+    def result(self, plant: Plant | None, source: str, sha256: str | None) -> ClosedLoopResult:
         """Return what the evidence has of the ramps and of the plant, given from a file or made of the recordings."""
         first = self.scenes[0] if self.scenes else None
         return ClosedLoopResult(
@@ -44,7 +42,6 @@ class FirmwareLoop:
             dynamics=first.loop.plant.parameters if first and not plant else None,
             back_MPa=first.backs_MPa if first else (),
             pressures=tuple(loop.result for loop in self.loops),
-            against_cvodes=against_cvodes,
         )
 
 
