@@ -4,7 +4,7 @@ Nothing of the code is loaded into dzdesign: a crash of it is one sentence, and 
 """
 
 import contextlib
-import marshal
+import json
 import subprocess
 import sys
 import tempfile
@@ -82,7 +82,7 @@ class CompiledLibrary:
                 raise RequirementError(self._failure)
         return returned
 
-    def _answer(self, asked: bytes, written: Sequence[np.ndarray], timeout_s: float) -> int:
+    def _answer(self, asked: Sequence[bytes], written: Sequence[np.ndarray], timeout_s: float) -> int:
         """Ask, fill the arrays and return what was returned; the first failure is kept in words."""
         process = self._process = self._process or self._started()
         asks, answers = process.stdin, process.stdout
@@ -97,13 +97,14 @@ class CompiledLibrary:
         timer = Timer(timeout_s, end_late)
         timer.start()
         try:
-            asks.write(asked)
+            for each in asked:
+                asks.write(each)
             asks.flush()
-            returned, octets = marshal.load(answers)
-            for array, each in zip(written, octets, strict=True):
-                array.reshape(-1).view(np.uint8)[:] = np.frombuffer(each, np.uint8)
-            return int(returned)
-        except (OSError, EOFError):  # the pipe of a process that has ended
+            line = answers.readline()
+            octets = [answers.readinto(each.reshape(-1).view(np.uint8)) for each in written]  # type: ignore[attr-defined]
+            if line.endswith(b"\n") and octets == [each.nbytes for each in written]:
+                return int(line)
+        except OSError:  # the pipe of a process that has ended
             pass
         except BaseException:
             self._ends()
@@ -154,21 +155,26 @@ def _end(process: "subprocess.Popen[bytes]") -> None:
                 pipe.close()
 
 
-def _frame(function: Function, given: Sequence[Given]) -> tuple[bytes, list[np.ndarray]]:
-    """Return a call as octets, and the arrays that its answer is written to."""
-    values: list[tuple[str, int | bytes | None]] = []
+def _frame(function: Function, given: Sequence[Given]) -> tuple[list[bytes], list[np.ndarray]]:
+    """Return the parts of a call, and the arrays that its answer is written to."""
+    values: list[tuple[str, int | None]] = []
+    sent: list[bytes] = []
     written: list[np.ndarray] = []
     for kind, value in zip(function.arguments, given, strict=True):
         if kind not in BUFFERS:
             if not isinstance(value, int):
                 raise TypeError(f"{function.name}() takes {kind}, got {type(value).__name__}")
-            values.append((kind, int(value)))
+            values.append((kind, value))
         elif value is None:
             values.append((kind, None))
         else:
             array = np.frombuffer(value, np.uint8) if isinstance(value, bytes) else np.asarray(value)
             if not array.flags.c_contiguous or (kind != "in" and not array.flags.writeable):
                 raise TypeError(f"{function.name}() takes arrays whose items lie in order, and writes into no octets")
-            values.append((kind, array.nbytes if kind == "out" else array.tobytes()))
-            written += [array] if kind != "in" else []
-    return marshal.dumps((function.name, function.returns, values)), written
+            values.append((kind, array.nbytes))
+            if kind != "out":
+                sent.append(array.tobytes())
+            if kind != "in":
+                written.append(array)
+    head = json.dumps([function.name, function.returns, values]).encode() + b"\n"
+    return [head, *sent], written

@@ -1,22 +1,21 @@
 """Serve calls of a shared library: the child process of `compiled_library`, which runs this file by itself.
 
-A call is the function, what it returns, and of each argument its kind and value: a number, the octets of a buffer, how
-many octets one has that is only written, or None for a null pointer. An answer is what was returned, and the octets of
-the buffers that were written. Both are in Python's `marshal`.
+A call is a line of JSON with the function, what it returns, and of each argument its kind and value: a number, or the
+octets of a buffer (null: a null pointer); then the buffers that are read. An answer is a line with what was returned,
+then the buffers that were written.
 """
 
-import contextlib
 import ctypes
-import marshal
+import json
 import os
 import sys
 from typing import BinaryIO
 
 
 def serve(library: ctypes.CDLL, asks: BinaryIO, answers: BinaryIO) -> None:
-    """Answer calls until their pipe ends, which is an `EOFError`."""
-    while True:
-        name, returns, arguments = marshal.load(asks)
+    """Answer calls until their pipe ends."""
+    for line in asks:
+        name, returns, arguments = json.loads(line)
         given: list[object] = []
         written: list[ctypes.Array[ctypes.c_char]] = []
         for kind, value in arguments:
@@ -25,15 +24,18 @@ def serve(library: ctypes.CDLL, asks: BinaryIO, answers: BinaryIO) -> None:
             elif value is None:
                 given.append(None)
             else:
-                buffer = (ctypes.c_char * (value if kind == "out" else len(value)))()
-                if kind != "out":
-                    buffer.raw = value
-                written += [buffer] if kind != "in" else []
+                buffer = (ctypes.c_char * max(value, 1))()
+                if kind != "out" and asks.readinto(memoryview(buffer)[:value]) != value:  # type: ignore[attr-defined]
+                    return
+                if kind != "in":
+                    written.append(buffer)
                 given.append(buffer)
         function = library[name]
         function.restype = None if returns == "void" else _type(returns)
         returned = function(*given)
-        marshal.dump((returned or 0, [bytes(each) for each in written]), answers)
+        answers.write(json.dumps(returned or 0).encode() + b"\n")
+        for buffer in written:
+            answers.write(buffer)
         answers.flush()
 
 
@@ -46,5 +48,4 @@ if __name__ == "__main__":
     # What the C prints is no answer.
     with os.fdopen(os.dup(1), "wb") as pipe:
         os.dup2(2, 1)
-        with contextlib.suppress(EOFError):
-            serve(ctypes.CDLL(sys.argv[1]), sys.stdin.buffer, pipe)
+        serve(ctypes.CDLL(sys.argv[1]), sys.stdin.buffer, pipe)
