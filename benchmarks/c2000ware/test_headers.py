@@ -12,9 +12,9 @@ import pytest
 from dzdesign.codegen.project import generate, target_named
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.design.firmware_manifest import Calibration
-from dzdesign.verify.compilation import HEADERS, PRELUDE, check_against_c2000ware
 from dzdesign.verify.toolchain.host_compiler import host_compiler
 from tests.codegen.f28335.test_f28335 import PLAIN, START_VALUES, SUPPLY, VALUES
+from tests.support.c2000ware import HEADERS, PRELUDE, check_against_c2000ware
 from tests.support.example_coil import SENSORS, with_current
 from tests.support.golden_firmware import golden_compensator
 
@@ -70,8 +70,7 @@ def firmware(folder: Path, target: str, drive: str, calibration: Calibration = "
 @pytest.mark.parametrize("calibration", ["fixed", "block"])
 @pytest.mark.parametrize("drive", SENSOR_OF)
 def test_the_f28335_compiles_against_them(drive, calibration, tmp_path):
-    check = check_against_c2000ware(firmware(tmp_path, "f28335", drive, calibration), WARE)
-    assert check.holds, check.text
+    assert check_against_c2000ware(firmware(tmp_path, "f28335", drive, calibration), WARE) == ""
 
 
 @pytest.mark.parametrize("calibration", ["fixed", "block"])

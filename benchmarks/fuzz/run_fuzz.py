@@ -20,7 +20,7 @@ from pathlib import Path
 SLOWEST_S, LONGEST, MEMORY_MB = 5, 65536, 2048
 NAMES = (
     "text", "recording", "low-flow", "valve", "compensator", "artefacts", "curves",
-    "options", "plant", "tolerances", "words",
+    "options", "plant", "words",
     "amplifier", "telemetry", "loading-frames", "loading", "calibration-file", "calibration-block",
 )  # fmt: skip
 #: How libFuzzer says how many inputs it tried.

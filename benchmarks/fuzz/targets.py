@@ -29,7 +29,6 @@ from dzdesign.identify.reading.text.table_reader import read_text_table
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.lot.summary import ValveManifest
 from dzdesign.verify.closed_loop.plant import read_plant
-from dzdesign.verify.closed_loop.population import read_tolerances
 from dzdesign.verify.closed_loop.ramps import read_curves
 from dzdesign.verify.evidence import Evidence, OutputEvidence
 
@@ -125,9 +124,6 @@ TARGETS = {
     ),
     "plant": Target(
         run=_stored(read_plant, "plant.toml"), seeds=lambda: [b"K_a = 4\nm_e_kg = 6e-2\nL_c_H = 0x10\n"]
-    ),
-    "tolerances": Target(
-        run=_stored(read_tolerances, "t.toml"), seeds=lambda: [b"machines = 9\nseed = 2\n"]
     ),
     "words": Target(
         run=_words,

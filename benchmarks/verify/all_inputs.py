@@ -11,8 +11,8 @@ from firmware import example_firmware
 from scoreboard import Row, print_rows, say
 
 from dzdesign.design.compensator import Compensator
-from dzdesign.verify.analysis.machine_code import check_on_machine
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
+from dzdesign.verify.exhaustive.machine_code import check_on_machine
 from dzdesign.verify.toolchain.compiled_core import CompiledCore
 from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4, HOST
 from tests.support.c_library import load_library

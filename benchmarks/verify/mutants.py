@@ -2,13 +2,14 @@
 
 import random
 import tempfile
+from collections import Counter
 from pathlib import Path
 from time import perf_counter
 
 from firmware import example_firmware
 from scoreboard import Row, print_rows, say
 
-from dzdesign.verify.analysis.mutation import MutationBench, all_mutants, judge_all, mutation_score
+from tests.support.core_mutants import KILLED, SURVIVED, MutationBench, all_mutants, judge_all
 
 QUICK = 60
 
@@ -25,14 +26,14 @@ def print_mutants(quick: bool = False, seed: int = 0) -> list[Row]:
             tried = random.Random(seed).sample(mutants, QUICK) if quick else mutants
             say(f"{target}: {len(tried)} of {len(mutants)} mutants ...")
             start = perf_counter()
-            score = mutation_score(judge_all(bench, tried))
+            outcomes = judge_all(bench, tried)
             seconds = perf_counter() - start
-        note = f"{score.killed} killed, {score.same_object} of the same object code, "
-        note += f"{score.same_outputs} of the same outputs, {score.refused} refused; {seconds:.0f} s"
+        found = Counter(each.verdict for each in outcomes)
+        note = f"{', '.join(f'{count} {verdict}' for verdict, count in found.items())}; {seconds:.0f} s"
         rows.append(
-            Row(what=f"{target}: mutants of {len(tried)} that survive", value=score.survived, limit=0, note=note)
+            Row(what=f"{target}: mutants of {len(tried)} that survive", value=found[SURVIVED], limit=0, note=note)
         )
-        for each in score.not_killed:
+        for each in (each for each in outcomes if each.verdict != KILLED):
             print(f"{target}: {each.verdict}, {each.file} line {each.line}: {each.change}")
     print_rows("Wrong C", rows)
     return rows

@@ -13,12 +13,12 @@ import numpy as np
 from current_valve import CONTROLLED
 from example_valve import example_valve
 from scoreboard import Row, print_rows, say
-from small_budgets import designed
 
 from dzdesign.verify.closed_loop.against_cvodes import MOST_APART, Window, compare
 from dzdesign.verify.closed_loop.loop import RECORD_S, ClosedLoop
 from dzdesign.verify.closed_loop.plant import Plant
 from dzdesign.verify.closed_loop.scene import Scene, scenes_of
+from tests.support.written_firmware import designed, written
 
 QUICK_S, WHOLE_S = 0.3, 1.0
 #: Times real time at least, and how often it is measured: the others held something else too.
@@ -61,7 +61,8 @@ def print_native_plant(*, quick: bool, seed: int) -> list[Row]:
     with tempfile.TemporaryDirectory(prefix="bench-verify-") as temporary:
         for number, (name, texts) in enumerate(DRIVES.items()):
             firmware = Path(temporary) / f"case{number}"
-            compensator = designed(example_valve(), firmware, **texts)
+            compensator = designed(example_valve(), **texts)
+            written(compensator, firmware)
             for plant in (None, Plant()):
                 scene = scenes_of(firmware, compensator, plant)[0]
                 rows += _rows(f"{name}, {'equations' if plant else 'recorded flow'}", scene, quick, {})

@@ -19,7 +19,6 @@ from current_valve import print_current_valve  # noqa: E402
 from hysteresis import print_hysteresis  # noqa: E402
 from mutants import print_mutants  # noqa: E402
 from native_plant import print_native_plant  # noqa: E402
-from population import print_population  # noqa: E402
 from scoreboard import run_parts  # noqa: E402
 from stand_in_flow import print_stand_in  # noqa: E402
 from verify_time import print_verify_time  # noqa: E402
@@ -28,7 +27,6 @@ PARTS = {
     "inputs": (print_inputs, 101),
     "native-plant": (print_native_plant, 1),
     "verify-time": (print_verify_time, 0),
-    "population": (print_population, 1),
     "stand-in": (print_stand_in, 0),
     "hysteresis": (print_hysteresis, 404),
     "mutants": (print_mutants, 202),

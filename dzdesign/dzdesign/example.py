@@ -1,4 +1,4 @@
-"""The bundled example: ramp tests of the paper's valve, simulated, with its plant and tolerances."""
+"""The bundled example: ramp tests of the paper's valve, simulated, with its plant."""
 
 from pathlib import Path
 

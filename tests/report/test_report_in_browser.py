@@ -49,13 +49,8 @@ CONTRASTS = """() => {
 }"""
 SIZES = """() => [...document.querySelectorAll('svg, img:not(.logo)')].filter(e => e.checkVisibility()).map(e => {
   const box = e.getBoundingClientRect(); return [box.width, box.height]; })"""
-IMAGES = """async () => Promise.all([...document.querySelectorAll('svg image')].map(async e => {
-  const image = new Image(); image.src = e.getAttribute('xlink:href') || e.getAttribute('href');
-  await image.decode(); return image.naturalWidth; }))"""
 LOST_LINKS = """() => [...document.querySelectorAll('a[href^="#"]')].map(a => a.getAttribute('href'))
   .filter(href => !document.getElementById(decodeURIComponent(href.slice(1))))"""
-DOWNLOADS = """async () => Promise.all([...document.querySelectorAll('a[download]')].map(async a =>
-  [a.download, await (await fetch(a.href)).text()]))"""
 #: The appendices are folded; what is in them is looked at too.
 UNFOLD = "document.querySelectorAll('details.appendix').forEach(each => { each.open = true; })"
 #: What reaches beyond the page's right edge without a box that scrolls around it.
@@ -212,37 +207,6 @@ def test_the_appendices_are_folded_on_a_screen_and_open_on_paper_and_for_a_link(
         page.emulate_media(media="screen")
         page.click('header a[href="#provenance"]')
         assert page.evaluate(seen)
-
-
-#: By how much each box's content is wider than the box.
-SCROLLS = """selector => [...document.querySelectorAll(selector)].map(e => e.scrollWidth - e.clientWidth)"""
-
-
-@pytest.mark.parametrize("name", ["demo", "valve alone"])
-def test_nothing_scrolls_sideways_on_a_wide_page_and_no_figure_on_a_narrow_one(browser, pages, name):
-    with opened(browser, pages[name]) as (page, _):
-        assert max(page.evaluate(SCROLLS, ".scroll")) == 0
-        assert not page.locator(".large").first.is_visible()
-    with opened(browser, pages[name], width=400) as (page, _):
-        assert max(page.evaluate(SCROLLS, "figure .scroll")) == 0
-        page.locator(".large input").first.check()
-        wider = page.evaluate(SCROLLS, "figure .scroll")
-        assert wider[0] > 250 and max(wider[1:]) == 0
-
-
-def test_the_raster_decodes_and_the_numbers_can_be_fetched(browser, pages):
-    with opened(browser, pages["demo"]) as (page, heard):
-        widths = page.evaluate(IMAGES)
-        assert widths and all(widths)
-        tables = dict(page.evaluate(DOWNLOADS))
-        assert len(tables) == 9
-        assert tables.keys() >= {"law-positive.csv", "budget-components-positive.csv"}
-        evidence = pages["demo"].parent
-        assert tables["zero-positive.csv"] == (evidence / "zero_command_positive.csv").read_text()
-        with page.expect_download() as waiting:
-            page.click('a[download="beta-positive.csv"]')
-        assert Path(waiting.value.path()).read_text(encoding="utf-8") == tables["beta-positive.csv"]
-        assert heard == []
 
 
 def test_it_prints_on_light_paper_without_what_only_a_screen_needs(browser, pages, tmp_path):

@@ -17,7 +17,7 @@ from dzdesign.verify.verification import not_tried, untried_requirements
 from tests.support.evidence import ALWAYS, DECLARED, EVIDENCE, read_evidence, with_checks
 from tests.support.synthetic import needs_compiler
 
-OPTIONAL = [requirements.RAMPS, requirements.MACHINE_CODE, requirements.UNDEFINED_BEHAVIOUR, requirements.MUTATION]
+OPTIONAL = [requirements.RAMPS, requirements.MACHINE_CODE]
 
 
 def test_every_requirement_has_its_id_its_title_and_a_way_to_have_it_checked():

@@ -1,7 +1,7 @@
-"""What law and drive take on a processor, as `verify --machine-code` measures it, for the READMEs.
+"""What law and drive take on a processor, for the READMEs.
 
 A generator has no compiler for the target, so these are figures of two designs of dzdesign's own, which a test measures
-again; whoever verifies a firmware is told its own.
+again.
 """
 
 from collections.abc import Mapping

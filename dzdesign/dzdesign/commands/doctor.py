@@ -46,8 +46,6 @@ OPTIONAL = (
          "winget install ZakKemble.avr-gcc"),
     Tool("simavr", "verify --machine-code: AVR", "apt install simavr", "brew install osx-cross/avr/simavr",
          "only in WSL: apt install simavr", ask=("--help",)),
-    Tool("frama-c", "verify --proof", "apt install frama-c-base", "opam install frama-c",
-         "only in WSL: apt install frama-c-base"),
     Tool("octave-cli", "verify of --target matlab", "apt install octave", "brew install octave",
          "winget install GNU.Octave"),
     Tool("cl2000", "to build for f28335 and f280049c; dzdesign does not call it", TI, TI, TI, ask=("-version",)),

@@ -10,9 +10,8 @@ Arguments = VerifyArguments
 EXAMPLES = (
     "dzdesign verify firmware",
     "dzdesign verify plc -o plc_evidence",
-    "dzdesign verify firmware --tolerances machines.toml",
     'dzdesign verify calibrated/lot/firmware --blocks "calibrated/valves/*/calibration.bin"',
-    "dzdesign verify firmware --machine-code --mutate --proof",
+    "dzdesign verify firmware --machine-code",
 )
 
 

@@ -25,9 +25,7 @@ if TYPE_CHECKING:
     from dzdesign.verify.verification import Verification
 
 #: Options that make no sense for an output other than a C firmware, unless its kind takes one.
-OF_FIRMWARE = (
-    "blocks", "plant", "back_pressure", "tolerances", "include", "c2000ware", "mutate", "machine_code", "proof",
-)  # fmt: skip
+OF_FIRMWARE = ("blocks", "plant", "back_pressure", "include", "machine_code")
 #: No port behind a valve's edge has more.
 LARGEST_BACK_MPA = 100.0
 
@@ -53,18 +51,10 @@ class VerifyArguments:
     back_pressure: Annotated[Texts, Option("P", example="1 MPa")] = ()
     """Pressure behind the metering edge in the closed loop (default: 0 and 1 MPa, or the span that the sensors have
     beside the tested pressure drops). Ramps run at the highest pressure, and failing sensors at each. Repeatable."""
-    tolerances: Annotated[AnyPath | None, Option("TOL.toml", CHECKS)] = None
-    """File with the number of machines to draw from the declared budget, such as demo/example/machines.toml."""
     include: Annotated[Paths, Option("DIR", CHECKS)] = ()
     """Folder of headers for your board files, such as those of your chip. Repeatable."""
-    c2000ware: Annotated[AnyPath | None, Option("DIR", CHECKS)] = None
-    """Folder of your C2000Ware. The f28335 firmware is then compiled against its headers too."""
-    mutate: Annotated[bool, Option(group=CHECKS)] = False
-    """Insert a fault at every place of the C code, one at a time, and count the faults that are detected."""
     machine_code: Annotated[bool, Option(group=CHECKS)] = False
     """Check machine code too. The Cortex-M4 runs every input in QEMU, and the AVR a sample in simavr."""
-    proof: Annotated[bool, Option(group=CHECKS)] = False
-    """Prove with Frama-C that nothing overflows a 16-bit int."""
 
 
 def verify(arguments: VerifyArguments) -> "Verification | OutputVerification":
@@ -147,7 +137,6 @@ def _verify_code(
     from dzdesign.block_checks import blocks_checked, given_blocks
     from dzdesign.report.valve_report import with_report
     from dzdesign.verify.closed_loop.plant import read_plant
-    from dzdesign.verify.closed_loop.population import read_tolerances
     from dzdesign.verify.verification import Asked, evidence_manifest
     from dzdesign.verify.verification import verify as verify_folder
 
@@ -169,12 +158,8 @@ def _verify_code(
             plant_source=plant_source,
             plant_sha256=digest,
             backs_MPa=_back_pressures_MPa(texts_of(arguments.back_pressure)),
-            tolerances=read_tolerances(Path(arguments.tolerances)) if arguments.tolerances is not None else None,
             include=[Path(place) for place in paths_of(arguments.include)],
-            c2000ware=None if arguments.c2000ware is None else Path(arguments.c2000ware),
             machine_code=arguments.machine_code,
-            proof=arguments.proof,
-            mutate=arguments.mutate,
             ramps=partial(ramps, stage) if ramps else None,
             blocks=of_blocks if blocks else None,
         )

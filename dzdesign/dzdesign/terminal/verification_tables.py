@@ -13,7 +13,6 @@ if TYPE_CHECKING:
 
     from dzdesign.core.recorded_units import RecordedUnits
     from dzdesign.identify.valve.model import ValveModel
-    from dzdesign.verify.evidence import MutationScore
     from dzdesign.verify.loop_results import PressureResult, ScenarioResult
     from dzdesign.verify.outputs.verification import OutputVerification
     from dzdesign.verify.verification import Verification
@@ -39,8 +38,6 @@ def print_verification(verification: "Verification", console: "Console | None" =
         _put_closed_loop(console, verification, units)
     print_scenarios(verification.evidence.scenarios, console, units)
     put_line(console, verification.verdict)
-    if verification.evidence.mutants:
-        print_firmware_mutants(verification.evidence.mutants, console)
 
 
 def print_output_verification(verification: "OutputVerification", console: "Console | None" = None) -> None:
@@ -187,10 +184,3 @@ def print_demo(valve: "ValveModel", verification: "Verification", folder: str) -
     put_line(console, f"Inputs checked: {checked}, wrong: {wrong}")
     put_line(console, verification.verdict)
     put_line(console, f"Open first: {folder}/evidence/report.html")
-
-
-def print_firmware_mutants(score: "MutationScore", console: "Console") -> None:
-    """Print what of the wrong C was not killed, and why."""
-    put_line(console, f"Mutants that were not killed; equivalent: {score.equivalent_means}")
-    for each in score.not_killed:
-        put_line(console, f"{each.verdict}, {each.file} line {each.line}: {each.change}")

@@ -13,7 +13,6 @@ from dzdesign.codegen.f28335.target import TARGET
 from dzdesign.codegen.loading.protocol import LOAD_FILES, STORE
 from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_files import write_folder
-from dzdesign.verify.analysis.machine_code import PROGRAM, prove
 from dzdesign.verify.current.controller_states import check_states
 from dzdesign.verify.current.current_checks import read_controller
 from dzdesign.verify.exhaustive.drive_check import drive_follows
@@ -23,6 +22,7 @@ from tests.support.block_cores import block_folder
 from tests.support.core_variants import variant
 from tests.support.current_loops import PLAIN, SUPPLY
 from tests.support.example_coil import SENSORS, with_current
+from tests.support.frama_c import PROGRAM, prove
 from tests.support.synthetic import needs_compiler
 
 

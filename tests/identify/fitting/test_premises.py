@@ -27,7 +27,7 @@ from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve import estimated_curvature
 from dzdesign.identify.valve.certified_bound import CertifiedBound, largest_excess
 from dzdesign.identify.valve.estimated_curvature import second_differences
-from dzdesign.verify.exhaustive.zero_command import SaggingBound
+from dzdesign.verify.exhaustive.zero_command import sagging_least
 from tests.support.repeatable_valves import identify
 from tests.support.synthetic import L_MIN, Truth, synthetic_ramp
 
@@ -129,14 +129,13 @@ class TestBound:
             trend="decreasing", confidence=0.99, premise="smooth", curvature_V_MPa2=tuple(bends),
             dp_MPa=tuple(SIX.tolist()), u_lower_V=tuple(lower),
         )  # fmt: skip
-        theirs = SaggingBound(side)
         for low, width in zip(rng.uniform(0.5, 4.5, 40), rng.uniform(0, 0.5, 40), strict=True):
             ends = Fraction(low).limit_denominator(10**6), Fraction(low + width).limit_denominator(10**6)
             pieces = ours.touching(*ends)
             least = min(each.least(max(ends[0], each.from_MPa), min(ends[1], each.to_MPa)) for each in pieces)
-            assert theirs.least(*ends) == least
+            assert sagging_least(side, *(np.array([end], dtype=object) for end in ends))[0] == least
             assert float(least) <= float(ours.in_doubles(np.linspace(*map(float, ends), 200)).min()) + 1e-12
-            doubles = theirs.least_in_doubles(*(np.array([float(end)]) for end in ends))[0]
+            doubles = sagging_least(side, *(np.array([float(end)]) for end in ends))[0]
             assert doubles == pytest.approx(float(least), abs=1e-12)
 
     @pytest.mark.parametrize("trend", ["decreasing", "increasing"])

@@ -96,14 +96,6 @@ def test_verification_fails_where_a_law_over_compensates(example_compensator, pl
 
 
 @pytest.mark.slow
-def test_a_plant_that_is_not_the_identified_valve_is_seen(firmware, plant, wording):
-    """With 45 N of preload it opens at 83 % of command and not at 54 %: the residual dead zone would be the plant's."""
-    found = verify(firmware, replace(plant, preload_N=45.0), sequence=QUICK)
-    (check,) = [check for check in found.evidence.checks if "identified valve" in check.name]
-    assert check.holds is False
-    wording.of_test(check.text)
-
-
 def test_what_a_plant_file_leaves_out_is_named(tmp_path):
     (tmp_path / "p.toml").write_text("preload_N = 20.0")
     said = []

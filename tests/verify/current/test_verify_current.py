@@ -3,18 +3,20 @@
 from dataclasses import replace
 from fractions import Fraction
 
+import numpy as np
 import pytest
 
 from dzdesign.design.current.circuit import CoilCircuit, CurrentSensor
-from dzdesign.design.current.drive import choose_loop, gains_of
-from dzdesign.design.current.responses import Gains, margins
-from dzdesign.verify.analysis import machine_code
+from dzdesign.design.current.drive import choose_loop, gains_of, sensor_line
+from dzdesign.design.current.responses import Gains, margins, run_loop
 from dzdesign.verify.current import corner_runs
-from dzdesign.verify.current.coil import CoilLoop, least_rise_s
+from dzdesign.verify.current.coil import CoilLoop, CoilSimulation, least_rise_s
 from dzdesign.verify.current.corner_runs import CURRENTS, stability_margins
 from dzdesign.verify.current.current_checks import current_checks
+from dzdesign.verify.exhaustive import machine_code
 from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4
 from tests.codegen.test_current_control import MEASURED, TEXTS
+from tests.support.current_loops import current_texts
 from tests.support.evidence import verify
 from tests.support.example_coil import COIL, CONVERTER, SAMPLING, SENSORS, asked, example_loop
 from tests.support.synthetic import needs_compiler
@@ -23,6 +25,7 @@ from tests.support.written_firmware import designed, replaced, written
 pytestmark = needs_compiler
 #: Fewer than `verify` compares, where a fault is a common one.
 STATES = 200_000
+STEPS = [6000] * 300 + [54000] * 200 + [30000] * 200
 
 
 def silent(_: str) -> None:
@@ -143,6 +146,20 @@ def test_the_margins_are_those_of_design_by_another_way(name):
         ]
         assert ours.phase_deg == pytest.approx(min(each.phase_deg for each in theirs), abs=0.02)
         assert ours.gain == pytest.approx(min(each.gain for each in theirs), rel=0.01)
+
+
+@pytest.mark.parametrize("name", SENSORS)
+def test_what_design_reckons_with_is_what_the_c_does(name):
+    """Every compare value of every corner over steps up and down, from rest on; the current to a nanoampere."""
+    loop, corners = example_loop(name), list(COIL.corners())
+    around = CoilLoop(loop=loop, circuit=COIL, sensor=SENSORS[name], converter=CONVERTER, sampling=SAMPLING)
+    simulated, line = CoilSimulation(around, current_texts(loop)), sensor_line(SENSORS[name], CONVERTER)
+    means, compares = run_loop(loop, COIL, corners, SAMPLING, line, STEPS)
+    for place, corner in enumerate(corners):
+        found = simulated.run(corner, STEPS)
+        assert not found["faults"].any()
+        assert np.array_equal(found["compare"], compares[:, place])
+        assert found["mean_A"] == pytest.approx(means[:, place], abs=1e-9)
 
 
 def test_a_small_fast_coil_has_the_margins_that_were_chosen():

@@ -1,6 +1,5 @@
 """The check of every input is checked: each count fires on a core that has just that fault, on every machine."""
 
-import json
 import re
 import shutil
 import subprocess
@@ -10,12 +9,10 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from dzdesign.command_line.cli import main
 from dzdesign.core.errors import RequirementError
-from dzdesign.verify.analysis import machine_code
-from dzdesign.verify.analysis.machine_code import check_on_machine, machine_code_checks
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs, first_wrong, input_check
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
+from dzdesign.verify.exhaustive.machine_code import check_on_machine, machine_code_checks
 from dzdesign.verify.exhaustive.test_vectors import (
     DIRECTION,
     OUTSIDE,
@@ -314,15 +311,3 @@ def input_check_of(folder):
     at_zero = np.zeros(prepared.differences.values.size, dtype=int)
     found = Findings(outputs_hash="", object_sha256="", at_zero=at_zero, **dict.fromkeys(COUNTED, 0))
     return input_check(prepared, CompiledCore(folder).sha256, found)
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("each_core_once")
-def test_the_command_line_reports_a_machine_that_is_not_here_and_does_not_hold(
-    firmware_folder, tmp_path, capsys, monkeypatch
-):
-    monkeypatch.setattr(machine_code, "MACHINES", (replace(CORTEX_M4, needs={"no-such-compiler": "its-package"}),))
-    assert main(["verify", str(firmware_folder), "--machine-code", "-o", str(tmp_path / "evidence")]) == 1
-    words = "NOT CHECKED  machine code of the Cortex-M4: not run: no-such-compiler not found; apt install its-package"
-    assert words in capsys.readouterr().out
-    assert json.loads((tmp_path / "evidence" / "verification.json").read_text())["holds"] is False

@@ -10,7 +10,7 @@ from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.verify.exhaustive.block_check import own_block_accepted
 from dzdesign.verify.folder import read_firmware_manifest
-from dzdesign.verify.toolchain.machines import HOST
+from dzdesign.verify.toolchain import compiled_library
 from tests.support.core_variants import variant
 from tests.support.synthetic import needs_compiler
 
@@ -114,7 +114,7 @@ def test_a_check_that_is_wrong_is_found(firmware, old, new, found):
 
 def test_a_check_that_hangs_is_found(firmware, monkeypatch):
     edit(firmware, CHECK, "return ~crc;", "for (;;) {\n    }")
-    monkeypatch.setattr("dzdesign.verify.exhaustive.block_check.HOST", replace(HOST, run_timeout_s=0.3))
+    monkeypatch.setattr(compiled_library, "CALL_S", 0.3)
     check = checked(firmware)
     assert check.holds is False and "did not end" in check.text
 

@@ -12,13 +12,21 @@ from dzdesign.core.errors import RequirementError
 from dzdesign.verify.folder import read_compensator, read_output_manifest
 from dzdesign.verify.outputs import texts
 from dzdesign.verify.outputs.every_pair import EveryPair
-from dzdesign.verify.outputs.texts import block_checks, function_checks, running
+from dzdesign.verify.outputs.texts import (
+    available_octave,
+    block_checks,
+    function_checks,
+    function_in_octave,
+    running,
+)
+from tests.support.core_variants import variant
 from tests.support.octave import OCTAVE, compensator_of, needs_octave
 from tests.support.paths import GOLDENS, GOLDENS_FULL
 from tests.support.synthetic import needs_compiler
 
 SETTINGS = {"iec61131": {"dialect": "twincat", "interface": "codes"}, "matlab": {}}
 EXACT = "equals the exactly rounded law"
+DESIGNS = ("no transition", "live zero", "inverted", "bipolar, all options")
 
 
 @pytest.fixture(scope="module")
@@ -96,31 +104,39 @@ def test_a_lower_bound_that_is_exceeded_is_seen(folder):
 
 @needs_octave
 @needs_compiler
-def test_a_good_function_holds_and_runs_in_octave(folder):
+def test_a_good_function_holds_in_octave(folder):
     found = checks_of(folder, "matlab")
     assert all(check.holds for check in found.checks), [check for check in found.checks if not check.holds]
-    hashes = {each.outputs_hash for each in found.inputs if each.name.startswith("dz_comp.m") and "drops" in each.name}
-    assert len(hashes) == 1 and "octave" in found.versions
-    assert {"core/dz_comp.c: " + EXACT, "dz_comp.m in Octave: " + EXACT} <= {check.name for check in found.checks}
+    assert {"exact-law", "fallback", "states", "over-compensation"} <= {check.id for check in found.checks}
+    assert {f"core/dz_comp.c: {EXACT}", f"dz_comp.m in Octave: {EXACT}"} <= {check.name for check in found.checks}
+    assert len(found.inputs) == 3 and "octave" in found.versions
+
+
+@needs_octave
+@pytest.mark.slow
+@pytest.mark.parametrize("name", DESIGNS)
+def test_the_functions_of_another_design_hold_in_octave(name, tmp_path):
+    made = variant(name)
+    write_output(generate_output(made, "matlab", {}), tmp_path / "matlab")
+    for sign in made.signals.signs:
+        found = function_in_octave(tmp_path / "matlab", sign, made, available_octave())
+        assert all(check.holds for check in found.checks)
 
 
 @needs_compiler
-def test_without_octave_the_function_is_evaluated_and_not_run(folder, monkeypatch):
+def test_without_octave_the_function_is_not_checked(folder, monkeypatch):
     monkeypatch.setattr(texts, "find_program", lambda _: None)
     found = {check.name: check for check in checks_of(folder, "matlab").checks}
-    assert found[f"dz_comp.m: {EXACT}"].holds is True
-    assert found["dz_comp.m in Octave"].holds is None and "apt install octave" in found["dz_comp.m in Octave"].text
+    check = found[f"dz_comp.m in Octave: {EXACT}"]
+    assert check.holds is None and "apt install octave" in check.text and found[f"core/dz_comp.c: {EXACT}"].holds
 
 
 @pytest.fixture
 def octave_of(folder):
-    made = compensator_of(GOLDENS)
-    every = EveryPair(made, "codes", (1,), remembers=False)
-
     def tried(old, new):
         edited(folder / "matlab" / "dz_comp.m", old, new)
-        text = texts._TriedText(folder / "matlab", "dz_comp.m", "m", every)
-        return {check.id: check for check in text.in_octave(OCTAVE).checks}
+        checks = function_in_octave(folder / "matlab", 1, compensator_of(GOLDENS), available_octave()).checks
+        return {check.id: check for check in checks}
 
     return tried
 
@@ -160,7 +176,7 @@ def test_octave_that_hangs_is_ended_and_runs_nothing_of_the_users(tmp_path, monk
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.setattr(texts, "TIMEOUT_S", 1.5)
     with running(OCTAVE, "waits", b"function [c, s, t] = waits(u, a, b)\n  pause(60);\nend\n") as function:
-        codes = {name: np.zeros(3) for name in ("u", "p_a", "p_b")}
+        codes = {name: np.zeros(3) for name in texts.INPUTS}
         with pytest.raises(RequirementError, match="did not end"):
             function(codes)
 
@@ -169,12 +185,12 @@ def test_an_octave_that_does_not_run_is_not_there(tmp_path, monkeypatch):
     for name in ("true", str(tmp_path)):
         monkeypatch.setattr(texts, "find_program", lambda _, name=name: name)
         octave = texts.available_octave()
-        assert not octave.path and octave.missing and not octave.versions
+        assert not octave.path and octave.missing and not octave.version
 
 
 def test_the_command_refuses_what_makes_no_sense(folder, tmp_path, capsys, wording):
     block = (folder / "iec61131").rename(folder / "plc")
-    for line in (["--mutate"], ["--plant", "plant.toml"], ["--back-pressure", "1 MPa"]):
+    for line in (["--machine-code"], ["--plant", "plant.toml"], ["--back-pressure", "1 MPa"]):
         assert main(["verify", str(block), *line, "-o", str(tmp_path / "evidence")]) == 2
         wording.of_test(capsys.readouterr().err)
     edited(block / "manifest.json", '"iec61131"', '"iec"')

@@ -14,7 +14,7 @@ from dzdesign.core.verdicts import DOES_NOT_HOLD, NOT_CHECKED
 from dzdesign.design.design_choices import Above
 from dzdesign.design.firmware_manifest import FirmwareOrigin
 from dzdesign.verify.current.results import CurrentLoopResult
-from dzdesign.verify.loop_results import ClosedLoopResult, Count, Population, ScenarioResult, Side, about
+from dzdesign.verify.loop_results import ClosedLoopResult, Count, ScenarioResult, Side, about
 from dzdesign.verify.requirements import ALWAYS, AS_STATED, CURRENT_VALVE, OF_CURRENT, RAMPS, Check
 
 Sign = Literal[1, -1]
@@ -164,32 +164,6 @@ class InputCheck(InputCounts):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MutantOutcome:
-    """Result of one mutant."""
-
-    file: Annotated[str, about("Name of the changed file.")]
-    line: Annotated[int, Meta(description="Line number.", ge=1, le=10**6)]
-    change: Annotated[str, about("Change that was made.")]
-    verdict: Annotated[str, about("Result: killed, refused by the compiler, equivalent or survived.")]
-    killer: Annotated[str, about("Check that caught the mutant; empty if none did.")] = ""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MutationScore:
-    """Wrong versions of the C code, and the number of them that the checks caught."""
-
-    mutants: Annotated[Count, about("Number of mutants.")]
-    killed: Annotated[Count, about("Number of mutants that a check caught.")]
-    refused: Annotated[Count, about("Number of mutants that the compiler refused.")]
-    same_object: Annotated[Count, about("Number of equivalent mutants with the same object code.")]
-    same_outputs: Annotated[Count, about("Number of equivalent mutants with the same outputs.")]
-    survived: Annotated[Count, about("Number of mutants that no check caught and that are not equivalent; must be 0.")]
-    killers: Annotated[Mapping[str, Count], about("Number of mutants that each check caught.")]
-    equivalent_means: Annotated[str, about("Definition of equivalence.")]
-    not_killed: Annotated[tuple[MutantOutcome, ...], about("Mutants that no check caught, with the reason.")]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Evidence(Artefact):
     """The evidence about one firmware, as `dzdesign verify` writes it."""
 
@@ -222,14 +196,10 @@ class Evidence(Artefact):
     scenarios: Annotated[
         tuple[ScenarioResult, ...], about("Results of the scenarios in closed loop, other than ramps.")
     ]
-    population: Annotated[
-        Population | None, about("Machines drawn from the declared budget, if --tolerances requested them.")
-    ]
     current_loop: Annotated[
         CurrentLoopResult | None,
         about("Current loop of a current-controlled drive; null for a duty-controlled one, or if it did not run."),
     ]
-    mutants: Annotated[MutationScore | None, about("Mutation test of the C code, if --mutate was given.")]
     not_covered: Annotated[
         Names, about("What the verdict does not cover, such as an identified side that the output does not drive.")
     ] = ()

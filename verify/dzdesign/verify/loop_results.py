@@ -1,4 +1,4 @@
-"""Evidence of the closed loop: ramps, scenarios and drawn machines, as ``verification.json`` holds them."""
+"""Evidence of the closed loop: ramps and scenarios, as ``verification.json`` holds them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -24,13 +24,49 @@ Flow = Annotated[float, Meta(ge=-1e6, le=1e6, extra_json_schema={"unit": "L/min"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PressureResult:
+class AtZero:
+    """What passes at zero command in one run, with the compensator."""
+
+    side: Side
+    dp_MPa: PressureDrop
+    unseen_below_L_min: Annotated[
+        Flow | None,
+        about(
+            "Flow below which the recordings show none, so that the plant's flow is unknown; null for a given plant."
+        ),
+    ]
+    leak_L_min: Annotated[Flow, about("Flow without drive at the end, which no compensator can stop.")]
+    allowed_at_zero_L_min: Annotated[
+        Flow | None,
+        about("Flow at zero command, leak included, that --zero-flow allows; null if only the leak is allowed."),
+    ]
+    q_zero_L_min: Annotated[
+        Flow,
+        about(
+            "Flow at zero command at the end, leak included. If a disturbance lasts and the whole scenario "
+            "is assessed, it is the largest flow at zero command."
+        ),
+    ]
+
+    @property
+    def q_beyond_L_min(self) -> float:
+        """Flow at zero command beyond what is allowed there: the leak, or more where a flow was declared."""
+        return self.q_zero_L_min - max(self.leak_L_min, self.allowed_at_zero_L_min or 0.0)
+
+    def in_words(self, flow_L_min: float, units: RecordedUnits) -> str:
+        """Return a flow to two decimals of a L/min, without its unit; what the recordings can't show is no 0.00."""
+        unseen = self.unseen_below_L_min
+        if unseen is not None and flow_L_min < unseen:
+            return f"below {units.number(unseen, '.2f L/min')}"
+        return units.number(flow_L_min, ".2f L/min")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PressureResult(AtZero):
     """One tested pressure drop; dead zones as shares of full command, at the onset (0.1 % of the largest flow) and at
     the reading flow.
     """
 
-    side: Side
-    dp_MPa: PressureDrop
     dead_zone_opening: Annotated[Share, about("Dead zone on opening without the compensator.")]
     dead_zone_closing: Annotated[Share, about("Dead zone on closing without the compensator.")]
     residual_opening: Annotated[Share, about("Dead zone on opening with the compensator.")]
@@ -45,18 +81,6 @@ class PressureResult:
     ideal_line: Annotated[
         Share, about("Command at the reading flow on an ideal line from zero command to the largest flow.")
     ]
-    unseen_below_L_min: Annotated[
-        Flow | None,
-        about(
-            "Flow below which the recordings show none, so that the plant's flow is unknown; null for a given plant."
-        ),
-    ]
-    leak_L_min: Annotated[Flow, about("Flow without drive, which no compensator can stop.")]
-    allowed_at_zero_L_min: Annotated[
-        Flow | None,
-        about("Flow at zero command, leak included, that --zero-flow allows; null if only the leak is allowed."),
-    ]
-    q_zero_L_min: Annotated[Flow, about("Flow at zero command after closing with the compensator, leak included.")]
     q_zero_without_beta_L_min: Annotated[
         Flow, about("Flow at zero command after closing with beta held at 1. It shows the effect of over-compensation.")
     ]
@@ -75,64 +99,6 @@ class PressureResult:
     ]
     q_max_direct_L_min: Annotated[Flow, about("Largest flow without the compensator.")]
     q_max_L_min: Annotated[Flow, about("Largest flow with the compensator.")]
-
-    @property
-    def q_beyond_L_min(self) -> float:
-        """Flow at zero command beyond what is allowed there: the leak, or more where a flow was declared."""
-        return self.q_zero_L_min - max(self.leak_L_min, self.allowed_at_zero_L_min or 0.0)
-
-    def in_words(self, flow_L_min: float, units: RecordedUnits) -> str:
-        """Return a flow to two decimals of a L/min; what the recordings can't show is no 0.00."""
-        return flow_in_words(flow_L_min, self.unseen_below_L_min, units)
-
-
-def flow_in_words(flow_L_min: float, unseen_below_L_min: float | None, units: RecordedUnits) -> str:
-    """Return a flow to two decimals of a L/min, or below which flow it is where no more is known; without its unit.
-
-    Examples
-    --------
-    >>> units = RecordedUnits()
-    >>> flow_in_words(0.0, 0.63, units), flow_in_words(0.71, 0.63, units), flow_in_words(0.0, None, units)
-    ('below 0.63', '0.71', '0.00')
-    """
-    if unseen_below_L_min is not None and flow_L_min < unseen_below_L_min:
-        return f"below {units.number(unseen_below_L_min, '.2f L/min')}"
-    return units.number(flow_L_min, ".2f L/min")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PlantComparison:
-    """Comparison of the closed loop's plant with CasADi's CVODES over one time window: a ramp, steps and load steps."""
-
-    side: Side
-    dp_MPa: Annotated[
-        tuple[float, float], quantity("MPa", "Lowest and highest pressure drop at no flow.")
-    ]
-    seconds: Annotated[float, quantity("s", "Length of the window.", gt=0, le=1000)]
-    step_s: Annotated[
-        float,
-        quantity("s", "Longest step of the plant, which follows from its fastest time constant.", gt=0, le=1),
-    ]
-    position_difference: Annotated[
-        float,
-        quantity(
-            "1",
-            "Largest difference of the spool positions at the ends of PWM periods, relative to the stroke.",
-            ge=0,
-            le=1e6,
-        ),
-    ]
-    flow_difference: Annotated[
-        float,
-        quantity(
-            "1",
-            "Largest difference of the flows at the ends of PWM periods, relative to the largest one in the window.",
-            ge=0,
-            le=1e6,
-        ),
-    ]
-    q_largest_L_min: Annotated[Flow, about("Largest flow in the window, by CVODES.")]
-    impacts: Annotated[Count, about("Number of times the spool hit a stop, by CVODES.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -159,39 +125,16 @@ class ClosedLoopResult:
         tuple[PressureResult, ...],
         about("Result for each side and tested pressure drop; empty if the closed loop did not run."),
     ]
-    against_cvodes: Annotated[
-        tuple[PlantComparison, ...], about("Comparison for each side; empty if it did not run.")
-    ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ScenarioResult:
+class ScenarioResult(AtZero):
     """Result of one scenario other than ramps, at one pressure drop."""
 
     name: Annotated[str, about("Name of the scenario.")]
-    side: Side
-    dp_MPa: PressureDrop
     back_MPa: Annotated[float, quantity("MPa", "Pressure downstream of the edge at the end.", ge=0, le=1000)]
-    leak_L_min: Annotated[Flow, about("Flow without drive at the end, which no compensator can stop.")]
-    allowed_at_zero_L_min: Annotated[
-        Flow | None,
-        about("Flow at zero command, leak included, that --zero-flow allows; null if only the leak is allowed."),
-    ]
-    q_zero_L_min: Annotated[
-        Flow,
-        about(
-            "Flow at zero command at the end, leak included. If a disturbance lasts and the whole scenario "
-            "is assessed, it is the largest flow at zero command."
-        ),
-    ]
     q_peak_at_zero_L_min: Annotated[
         Flow, about("Largest flow while the command was zero and the valve had already closed.")
-    ]
-    unseen_below_L_min: Annotated[
-        Flow | None,
-        about(
-            "Flow below which the recordings show none, so that the plant's flow is unknown; null for a given plant."
-        ),
     ]
     must_shut: Annotated[bool, about("Whether flow at zero command is a failure.")]
     not_required: Annotated[
@@ -207,51 +150,3 @@ class ScenarioResult:
     def is_load_step(self) -> bool:
         """Whether the pressure drop jumps in it."""
         return "pressure_drop_then_MPa" in self.figures
-
-    @property
-    def q_beyond_L_min(self) -> float:
-        """Flow at zero command beyond what is allowed there: the leak, or more where a flow was declared."""
-        return self.q_zero_L_min - max(self.leak_L_min, self.allowed_at_zero_L_min or 0.0)
-
-    def in_words(self, flow_L_min: float, units: RecordedUnits) -> str:
-        """Return a flow to two decimals of a L/min; what the recordings can't show is no 0.00."""
-        return flow_in_words(flow_L_min, self.unseen_below_L_min, units)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Population:
-    """Machines drawn from the declared budget: drive and threshold of each at and between the tested pressure drops."""
-
-    machines: Annotated[int, Meta(description="Number of machines.", ge=1, le=10**9)]
-    seed: Annotated[int, Meta(description="Random seed of the draw.", ge=0, le=2**60)]
-    flowing: Annotated[
-        Count, about("Number of machines whose drive at zero command is above the threshold of their valve.")
-    ]
-    confidence: Annotated[float, quantity("1", "Confidence level of the upper limit.", ge=0.5, le=1)]
-    upper_limit: Annotated[
-        float,
-        quantity(
-            "1", "Upper limit of the probability that a machine passes flow, after Clopper and Pearson.", ge=0, le=1
-        ),
-    ]
-    pressures: Annotated[
-        int, Meta(description="Number of pressure drops at which each machine was tried.", ge=1, le=10**6)
-    ]
-    least_margin_V: Annotated[
-        float, quantity("V", "Least margin of the threshold above the drive, as command.", ge=-1e6, le=1e6)
-    ]
-    least_dp_MPa: Annotated[float, quantity("MPa", "Pressure drop at which that margin occurs.", ge=0, le=1000)]
-    worst: Annotated[
-        Mapping[str, float],
-        about("Machine with that margin: position of each component within its half-width, from -1 to 1."),
-    ]
-    in_loop: Annotated[Count, about("Number of machines, those with the least margins, that ran in the closed loop.")]
-    flowing_in_loop: Annotated[
-        Count, about("Number of these with flow at zero command beyond what is allowed.")
-    ]
-    never_open: Annotated[
-        Count,
-        about("Number of these that did not open at some pressure drop, so that they could not be seen to close."),
-    ]
-    largest_L_min: Annotated[Flow, about("Largest flow of these at zero command beyond what is allowed.")]
-    largest_dp_MPa: Annotated[float, quantity("MPa", "Pressure drop at which that flow occurs.", ge=0, le=1000)]

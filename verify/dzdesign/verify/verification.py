@@ -10,34 +10,26 @@ from pathlib import Path
 
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
 from dzdesign.core.artefact_types import THIS_TOOL, Artefact, SourceFile, as_document, schema_of, to_json_bytes
-from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.core.errors import RequirementError
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.core.verdicts import NOT_ASKED_FOR, NOT_CHECKED
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.design.pressure_inputs import not_covered
 from dzdesign.verify import requirements
-from dzdesign.verify.analysis import mutation
-from dzdesign.verify.analysis.machine_code import machine_code_checks, proof_check
 from dzdesign.verify.closed_loop.against_cvodes import compare_with_cvodes
 from dzdesign.verify.closed_loop.firmware_loop import FirmwareLoop, Watch, close_the_loop
 from dzdesign.verify.closed_loop.loop import RampSequence
 from dzdesign.verify.closed_loop.plant import Plant
-from dzdesign.verify.closed_loop.population import NOT_DECLARED, Tolerances
 from dzdesign.verify.closed_loop.ramps import Curves, LoopComparison, csv_of, loop_curves
 from dzdesign.verify.closed_loop.scene import Scene, scenes_of
-from dzdesign.verify.compilation import (
-    board_compiles,
-    check_against_c2000ware,
-    check_include,
-    check_ware,
-    compiles_strictly,
-)
+from dzdesign.verify.compilation import board_compiles, check_include, compiles_strictly
 from dzdesign.verify.current.current_checks import CurrentChecks, current_checks
-from dzdesign.verify.evidence import Evidence, InputCheck, MutationScore
+from dzdesign.verify.evidence import Evidence, InputCheck
 from dzdesign.verify.exhaustive.all_inputs import every_input, input_checks, lot_checked
 from dzdesign.verify.exhaustive.block_check import own_block_accepted
 from dzdesign.verify.exhaustive.drive_check import drive_follows
+from dzdesign.verify.exhaustive.machine_code import machine_code_checks
 from dzdesign.verify.folder import (
     Regenerated,
     as_generated,
@@ -48,7 +40,6 @@ from dzdesign.verify.folder import (
     reproduced,
     user_files,
 )
-from dzdesign.verify.loop_results import PlantComparison
 from dzdesign.verify.requirements import EVERY_RUN, OF_SOME, Check, Requirement, Tried, checks_of
 from dzdesign.verify.toolchain.host_compiler import host_compiler
 
@@ -71,14 +62,9 @@ class Asked:
     #: The command over time, and the pressures downstream of the edge.
     sequence: RampSequence = field(default_factory=RampSequence)
     backs_MPa: Sequence[float] | None = None
-    #: How many machines are drawn from the declared budget.
-    tolerances: Tolerances | None = None
-    #: Folders with headers of the user's board files, and of C2000Ware.
+    #: Folders with headers of the user's board files.
     include: Sequence[Path] = ()
-    c2000ware: Path | None = None
     machine_code: bool = False
-    proof: bool = False
-    mutate: bool = False
     #: With the ramp tests, and with the calibration blocks of other valves.
     ramps: FrontDoor | None = None
     blocks: FrontDoor | None = None
@@ -105,9 +91,7 @@ class Firmware:
     curves: dict[str, Curves] = field(default_factory=dict)
     current: CurrentChecks = field(default_factory=CurrentChecks)
     loop: FirmwareLoop = field(default_factory=FirmwareLoop)
-    compared: tuple[PlantComparison, ...] = ()
     board_not_compiled: str = ""
-    mutants: MutationScore | None = None
 
     def is_as_generated(self) -> bool:
         """Tell whether more is tried than its text: of a folder that differs nothing else is."""
@@ -158,12 +142,11 @@ def _closed_loop(firmware: Firmware) -> Iterator[Check]:
     asked = firmware.asked
     scenes = firmware.scenes.result() if firmware.scenes else ()
     firmware.loop = close_the_loop(
-        scenes, firmware.compensator, asked.plant, asked.sequence, asked.tolerances, firmware.say, firmware.watch
+        scenes, firmware.compensator, asked.plant, asked.sequence, firmware.say, firmware.watch
     )
     firmware.curves = {**loop_curves(firmware.loop.loops), **firmware.curves}
     yield from firmware.loop.checks
-    firmware.compared, native_plant = compare_with_cvodes(scenes, firmware.say)
-    yield native_plant
+    yield compare_with_cvodes(scenes, firmware.say)
 
 
 def _board(firmware: Firmware) -> Sequence[Check]:
@@ -175,21 +158,6 @@ def _board(firmware: Firmware) -> Sequence[Check]:
 def _machine_code(firmware: Firmware) -> list[Check]:
     firmware.say("comparing the machine code of other processors with the exact law, in simulators")
     return machine_code_checks(firmware.code, firmware.inputs)
-
-
-def _proof(firmware: Firmware) -> list[Check]:
-    firmware.say("reading the core's C for all inputs, with Frama-C: some minutes")
-    return [proof_check(firmware.code)]
-
-
-def _mutants(firmware: Firmware) -> list[Check]:
-    bench = mutation.MutationBench(firmware.code)
-    mutants = mutation.all_mutants(bench)
-    firmware.say(f"checking the core with {len(mutants)} faults, one at a time")
-    bench.check_original()
-    judged = mutation.judge_all(bench, mutants, lambda work: firmware.watch(work, len(work)))
-    firmware.mutants = mutation.mutation_score(judged)
-    return [mutation.mutation_check(firmware.mutants)]
 
 
 def _asks(name: str) -> Callable[[Firmware], bool]:
@@ -223,13 +191,6 @@ REQUIREMENTS: tuple[Tried[Firmware], ...] = (
         _asks("blocks"),
     ),
     Tried((requirements.MACHINE_CODE,), _machine_code, _asks("machine_code")),
-    Tried((requirements.UNDEFINED_BEHAVIOUR,), _proof, _asks("proof")),
-    Tried((requirements.MUTATION,), _mutants, _asks("mutate")),
-    Tried(
-        (requirements.C2000WARE,),
-        lambda each: [check_against_c2000ware(each.folder, each.asked.c2000ware or Path(), each.say)],
-        lambda each: each.asked.c2000ware is not None,
-    ),
 )  # fmt: skip
 
 
@@ -287,7 +248,7 @@ def verify(
         folder=folder, again=again, code=code or folder, manifest=read_firmware_manifest(folder),
         compensator=read_compensator(folder), asked=asked, say=say, watch=watch,
     )  # fmt: skip
-    _refuse(firmware)
+    check_include(asked.include, firmware.manifest)
     host_compiler()
     checks = checks_of(REQUIREMENTS, firmware)
     manifest = firmware.manifest
@@ -301,25 +262,13 @@ def verify(
         board_not_compiled=firmware.board_not_compiled,
         checks=checks,
         inputs=firmware.inputs,
-        closed_loop=firmware.loop.result(asked.plant, asked.plant_source, asked.plant_sha256, firmware.compared),
+        closed_loop=firmware.loop.result(asked.plant, asked.plant_source, asked.plant_sha256),
         scenarios=firmware.loop.scenarios,
-        population=firmware.loop.population,
         current_loop=firmware.current.result,
-        mutants=firmware.mutants,
         not_covered=not_covered(firmware.compensator),
     )
     derived = firmware.compensator if firmware.same and firmware.same.holds else None
     return Verification(evidence=evidence, curves=firmware.curves, loops=firmware.loop.loops, derived=derived)
-
-
-def _refuse(firmware: Firmware) -> None:
-    """Refuse what is asked for and does not go with the firmware, or with what else is asked for."""
-    asked = firmware.asked
-    check_include(asked.include, firmware.manifest)
-    if asked.tolerances and firmware.compensator.machine is None:
-        raise InputError(NOT_DECLARED)
-    if asked.c2000ware is not None:
-        check_ware(firmware.folder, firmware.manifest, asked.c2000ware)
 
 
 def manifest_source(folder: Path) -> tuple[SourceFile]:
@@ -354,9 +303,7 @@ def untried_requirements(evidence: Evidence) -> tuple[Requirement, ...]:
         needed.BOARD_FILES: bool(evidence.board_not_compiled),
         needed.OWN_PLANT: evidence.closed_loop.plant is None,
         needed.LOAD_STEPS: not any(each.is_load_step for each in evidence.scenarios),
-        needed.POPULATION: evidence.population is None,
         needed.PRESSURE_INPUTS: len(evidence.inputs) > 1 and needed.PRESSURE_INPUTS.id not in tried,
-        needed.C2000WARE: evidence.target == "f28335" and needed.C2000WARE.id not in tried,
         needed.CALIBRATION_BLOCK: False,
     }
     for each in (each for row in REQUIREMENTS for each in row.requirements):

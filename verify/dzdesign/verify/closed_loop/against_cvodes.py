@@ -9,15 +9,13 @@ is a constant force over the next one; a stop swallows the spool's speed, and ho
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from dzdesign.core.artefact_reading import rounded
 from dzdesign.verify.closed_loop.loop import PERIODS_PER_RECORD, RECORD_S, LoopRun
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
-from dzdesign.verify.closed_loop.scene import DECIMALS, Scene, rounded_up
-from dzdesign.verify.loop_results import PlantComparison
+from dzdesign.verify.closed_loop.scene import Scene, rounded_up
 from dzdesign.verify.requirements import NATIVE_PLANT, Check
 
 if TYPE_CHECKING:
@@ -25,7 +23,7 @@ if TYPE_CHECKING:
 
 #: Largest differences: of the position over the stroke, and of the flow over the largest one of the window.
 MOST_APART = 1e-5
-#: What is stored of a difference that is no number.
+#: What is told of a difference that is no number.
 NO_NUMBER = 1e6
 #: Of all sides' windows together; and from a window's first pulse for how long at most, where slow ramps stretch it.
 WINDOW_S, LONGEST_S = 1.0, 4.0
@@ -49,6 +47,17 @@ PLACES = 8
 #: Rests and flights in one phase; more would be chatter at a stop. Nothing shorter than this is integrated, ms.
 MOST_EVENTS, SHORTEST_MS = 40, 1e-12
 PERIOD_MS = 1e3 * PWM_PERIOD_S
+
+
+class PlantComparison(NamedTuple):
+    """One window; a difference is an upper limit, of positions over the stroke, of flows over the largest."""
+
+    seconds: float
+    position_difference: float
+    flow_difference: float
+    #: By CVODES: the largest flow, and how often the spool met a stop.
+    q_largest_L_min: float
+    impacts: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,19 +102,16 @@ class Window:
         )  # fmt: skip
 
 
-def compare_with_cvodes(
-    scenes: Sequence[Scene], say: Callable[[str], None]
-) -> tuple[tuple[PlantComparison, ...], Check]:
-    """Run the window of every side in both; return what is between them, and whether it is little enough."""
+def compare_with_cvodes(scenes: Sequence[Scene], say: Callable[[str], None]) -> Check:
+    """Run the window of every side in both, and tell whether what is between them is little enough."""
     say("comparing the plant with CasADi's CVODES")
     of_sides = list({scene.side: scene for scene in reversed(scenes)}.values())[::-1]
     try:
-        found = tuple(compare(Window.of(scene, WINDOW_S / len(of_sides))) for scene in of_sides)
+        return native_plant_check([compare(Window.of(scene, WINDOW_S / len(of_sides))) for scene in of_sides])
     except RuntimeError as error:  # of CasADi, of an integrator that gives up
         reason = next((line for line in reversed(str(error).splitlines()) if line.strip()), "no reason given")
         text = f"CVODES gave up ({reason.strip()[:100]}): correct mass, spring, damping or coil in --plant"
-        return (), NATIVE_PLANT.check(holds=None, text=text)
-    return found, native_plant_check(found)
+        return NATIVE_PLANT.check(holds=None, text=text)
 
 
 def compare(window: Window) -> PlantComparison:
@@ -141,17 +147,7 @@ def compare(window: Window) -> PlantComparison:
     position, *of_flow = (float(np.abs(each).max()) for each in (native.position_mm[part] - position_mm, *flows_apart))
     apart = (position / spool.plant.stroke_mm, max(of_flow) / (largest if largest > 0 else 1.0))
     position, flow = (rounded_up(each) if each < NO_NUMBER else NO_NUMBER for each in apart)
-    found = PlantComparison(
-        side=window.scene.side,
-        dp_MPa=(float(supply.min()), float(supply.max())),
-        seconds=(end - begin) * PWM_PERIOD_S,
-        step_s=spool.plant.step_s(float(supply.max())),
-        position_difference=position,
-        flow_difference=flow,
-        q_largest_L_min=largest,
-        impacts=spool.impacts,
-    )
-    return rounded(found, DECIMALS)
+    return PlantComparison((end - begin) * PWM_PERIOD_S, position, flow, largest, spool.impacts)
 
 
 def native_plant_check(found: Sequence[PlantComparison]) -> Check:

@@ -1,4 +1,4 @@
-"""A firmware in closed loop: ramps, scenarios and drawn machines at every tested pressure drop, and the checks."""
+"""A firmware in closed loop: ramps and scenarios at every tested pressure drop, and the checks."""
 
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
@@ -9,11 +9,10 @@ from dzdesign.design.compensator import Compensator
 from dzdesign.verify.closed_loop.loop import RampSequence
 from dzdesign.verify.closed_loop.loop_checks import loop_checks
 from dzdesign.verify.closed_loop.plant import Plant
-from dzdesign.verify.closed_loop.population import Tolerances, run_population
 from dzdesign.verify.closed_loop.ramps import LoopComparison, compare_at_pressure
 from dzdesign.verify.closed_loop.scenarios import run_scenarios
 from dzdesign.verify.closed_loop.scene import Scene
-from dzdesign.verify.loop_results import ClosedLoopResult, PlantComparison, Population, ScenarioResult
+from dzdesign.verify.loop_results import ClosedLoopResult, ScenarioResult
 from dzdesign.verify.requirements import Check
 
 #: Shows how far a stage is: pieces and their number in, the pieces out.
@@ -32,11 +31,8 @@ class FirmwareLoop:
     scenes: tuple[Scene, ...] = ()
     loops: tuple[LoopComparison, ...] = ()
     scenarios: tuple[ScenarioResult, ...] = ()
-    population: Population | None = None
 
-    def result(
-        self, plant: Plant | None, source: str, sha256: str | None, against_cvodes: tuple[PlantComparison, ...]
-    ) -> ClosedLoopResult:
+    def result(self, plant: Plant | None, source: str, sha256: str | None) -> ClosedLoopResult:
         """Return what the evidence has of the ramps and of the plant, given from a file or made of the recordings."""
         first = self.scenes[0] if self.scenes else None
         return ClosedLoopResult(
@@ -46,7 +42,6 @@ class FirmwareLoop:
             dynamics=first.loop.plant.parameters if first and not plant else None,
             back_MPa=first.backs_MPa if first else (),
             pressures=tuple(loop.result for loop in self.loops),
-            against_cvodes=against_cvodes,
         )
 
 
@@ -55,12 +50,10 @@ def close_the_loop(
     compensator: Compensator,
     plant: Plant | None,
     sequence: RampSequence,
-    tolerances: Tolerances | None,
     say: Callable[[str], None],
     watch: Watch,
 ) -> FirmwareLoop:
-    """Run the ramps, the scenarios and, where it is asked for, machines that are drawn."""
-    population = None
+    """Run the ramps and the scenarios."""
     with ThreadPoolExecutor(WORKERS) as pool:
 
         def at_each(text: str, run: Callable[[Scene], Any]) -> tuple[Any, ...]:
@@ -69,14 +62,10 @@ def close_the_loop(
 
         loops = at_each("running the closed loop", lambda scene: compare_at_pressure(scene, sequence))
         scenarios = at_each("running the scenarios", lambda scene: tuple(run_scenarios(scene)))
-    if tolerances:
-        say(f"running {tolerances.machines} machines drawn from the budget (seed {tolerances.seed})")
-        population = run_population(scenes, tolerances.machines, tolerances.seed)
     results, found = [loop.result for loop in loops], tuple(each for of_scene in scenarios for each in of_scene)
     return FirmwareLoop(
-        checks=loop_checks(results, found, compensator, population, plant_given=plant is not None),
+        checks=loop_checks(results, found, compensator, plant_given=plant is not None),
         scenes=scenes,
         loops=loops,
         scenarios=found,
-        population=population,
     )

@@ -12,12 +12,11 @@ from dzdesign.verify.closed_loop.drive_corners import NOT_DECLARED, RELEASED
 from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN
 from dzdesign.verify.closed_loop.ramps import BIN
 from dzdesign.verify.closed_loop.scene import NO_CORE_CAN_KNOW
-from dzdesign.verify.loop_results import Population, PressureResult, ScenarioResult
+from dzdesign.verify.loop_results import PressureResult, ScenarioResult
 from dzdesign.verify.requirements import (
     CURRENT_VALVE,
     PLANT_IS_THE_VALVE,
     PLANT_OPENS,
-    POPULATION,
     ZERO_FLOW,
     ZERO_FLOW_AFTER_SCENARIOS,
     Check,
@@ -45,9 +44,8 @@ Result = PressureResult | ScenarioResult
 
 
 def loop_checks(
-    ramps: Sequence[PressureResult], scenarios: Sequence[ScenarioResult], compensator: Compensator,
-    population: Population | None = None, *, plant_given: bool,
-) -> tuple[Check, ...]:  # fmt: skip
+    ramps: Sequence[PressureResult], scenarios: Sequence[ScenarioResult], compensator: Compensator, *, plant_given: bool
+) -> tuple[Check, ...]:
     """Return all of them, in the order of the report."""
     zero_flow, valve = no_flow_at_zero(ramps, compensator, plant_given=plant_given), compensator.valve
     units = valve.recorded_units
@@ -56,7 +54,6 @@ def loop_checks(
         plant_is_the_valve(ramps, valve) if plant_given else stand_in_is_the_recording(ramps, valve),
         zero_flow,
         shut_after_scenarios(scenarios, zero_flow, units, plant_given=plant_given),
-        *([of_population(population, zero_flow, units)] if population else []),
         *([opens_with_any_coil(scenarios, units)] if compensator.current_drive else []),
     )
 
@@ -286,32 +283,6 @@ def _not_required(scenarios: Sequence[ScenarioResult], units: RecordedUnits) -> 
             text += "; signals with a live zero and headroom above the span would reveal the failed sensor"
         found.append(text)
     return tuple(found)
-
-
-def of_population(population: Population, zero_flow: Check, units: RecordedUnits) -> Check:
-    """Tell whether any machine drawn from the budget passes flow at zero command."""
-    text = (
-        f"the drive of {population.flowing} of {population.machines} machines at {population.pressures} pressure drops "
-        f"each (seed {population.seed}) is above their valve's threshold; with {population.confidence:.0%} confidence, "
-        f"that of less than a fraction of {population.upper_limit:.2g} of all machines is; the least margin is "
-        f"{units.text(population.least_margin_V, '.2g V')} at {units.text(population.least_dp_MPa, '.2f MPa')}"
-    )
-    flows = population.flowing or population.flowing_in_loop
-    if flows:
-        most = sorted(population.worst.items(), key=lambda item: -abs(item[1]))[:3]
-        at = ", ".join(f"{name} {share:+.2f}" for name, share in most)
-        text += f", by a machine with {at} of the half-widths"
-    text += f"; {population.flowing_in_loop} of the {population.in_loop} with the least margins flow in the loop"
-    if flows:
-        text += (
-            f", at most {units.text(population.largest_L_min, '.2g L/min')} at "
-            f"{units.text(population.largest_dp_MPa, '.2f MPa')}"
-        )
-    if population.never_open:
-        text += f"; {population.never_open} did not open, so their closing could not be checked"
-    if zero_flow.holds is None:
-        return POPULATION.check(holds=None, text=f"{text}; see the ramps")
-    return POPULATION.check(holds=not flows and not population.never_open, text=text)
 
 
 def opens_with_any_coil(scenarios: Sequence[ScenarioResult], units: RecordedUnits) -> Check:

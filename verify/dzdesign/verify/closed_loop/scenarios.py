@@ -1,7 +1,7 @@
 """What a machine does to a valve beside ramps: steps, load steps, noise, wrong readings, a reset, cold and hot oil.
 
 Each pressure sensor fails by itself: its wire breaks, it is shorted, it is stuck; at each pressure behind the edge.
-Coil and supply stand in drive_corners.py.
+Coil and supply stand in drive_corners.py, wrong readings and the declared machine in declared_machine.py.
 """
 
 from collections.abc import Iterator
@@ -9,9 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from dzdesign.design.target_inputs import Converter
-from dzdesign.verify.closed_loop.drive_corners import NOT_DECLARED, coil_and_supply
-from dzdesign.verify.closed_loop.loop import LoopRun, ReadingErrors
+from dzdesign.verify.closed_loop.declared_machine import all_at_the_worst, readings_off
+from dzdesign.verify.closed_loop.drive_corners import coil_and_supply
+from dzdesign.verify.closed_loop.loop import LoopRun
 from dzdesign.verify.closed_loop.scene import NO_CORE_CAN_KNOW, SETTLE_S, STEP_S, Ends, Scene, ramp
 from dzdesign.verify.loop_results import ScenarioResult
 
@@ -42,6 +42,7 @@ def run_scenarios(scene: Scene) -> Iterator[ScenarioResult]:
     yield from readings_off(scene)
     yield _restart(scene)
     yield from coil_and_supply(scene)
+    yield from all_at_the_worst(scene)
     yield from _oils(scene)
 
 
@@ -177,37 +178,6 @@ def converter_off_at_zero(scene: Scene) -> Iterator[ScenarioResult]:
             judged=slice(before.size + round(scene.settle_s / STEP_S), None),
             figures={"mean_flow_L_min": run.q_mean_L_min[before.size :].mean()},
             not_required=reason,
-        )
-
-
-def readings_off(scene: Scene) -> Iterator[ScenarioResult]:
-    """Pressures that sensors and converter read wrong, so that dP reads too low or too high; noisy on top.
-
-    Errors as declared; of a machine that was not, of the target's converter alone. Judged while it lasts.
-    """
-    machine, target = scene.compensator.machine, scene.compensator.target
-    converter = target.converter if target else Converter()
-    offset, gain, noise = (
-        (machine.pressure_offset_codes, machine.pressure_gain_codes, machine.pressure_noise_codes)
-        if machine
-        else (converter.offset_codes, converter.gain_codes, converter.noise_codes)
-    )
-    own_MPa = (machine.pressure_error_a_MPa, machine.pressure_error_b_MPa) if machine else (0.0, 0.0)
-    own = own_MPa * scene.loop.channels.per_unit[1:]
-    command = scene.opened_and_closed()
-    for name, way in (("low", -1), ("high", 1)):
-        a, b = (-way, way) if scene.loop.channels.swapped else (way, -way)
-        errors = ReadingErrors(
-            offset_codes=(0.0, a * (offset + own[0]), b * (offset + own[1])),
-            gain_codes=(0.0, a * gain, b * gain),
-            noise_codes=(0, noise, noise),
-            seed=SEED,
-        )
-        yield scene.result(
-            f"dP read too {name}: {'sensors and ' if machine else ''}converter off, ±{noise} codes of noise",
-            scene.run(command, errors=errors),
-            judged=slice(command.size - scene.held(0).size, None),
-            not_required="" if machine else NOT_DECLARED,
         )
 
 

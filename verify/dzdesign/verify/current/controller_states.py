@@ -14,7 +14,7 @@ from dzdesign.core.errors import RequirementError
 from dzdesign.design.current.circuit import CORRECTION_SHIFT, CurrentLoop
 from dzdesign.verify.current.results import ControllerStates
 from dzdesign.verify.toolchain.compiled_library import CompiledLibrary, Function
-from dzdesign.verify.toolchain.machines import HOST, Machine
+from dzdesign.verify.toolchain.machines import Machine
 
 PROGRAMS = Path(str(files("dzdesign.verify.current"))) / "programs"
 #: Bits of the faults.
@@ -182,10 +182,9 @@ def check_states(
 ) -> tuple[ControllerStates, tuple[int, ...]]:
     """Compare so many states on the host, and a few calibrations, with the exact controller; return their hashes too.
 
-    A controller that crashes is a `RequirementError`: it is run in a program of its own first. There is a hash of each
-    block of states, and one of the calibrations.
+    There is a hash of each block of states, and one of the calibrations. A controller that crashes is a
+    `RequirementError`.
     """
-    hashes_on(HOST, loop, core, states, seed)
     host, wrong, first, hashes = HostStates(loop, core), 0, [], []
     for block in range(-(-states // BLOCK)):
         periods, hashed = host.periods(block + seed, BLOCK)

@@ -21,7 +21,7 @@ from dzdesign.verify.requirements import (
     MACHINE_CODE,
     Check,
 )
-from dzdesign.verify.toolchain.machines import BLOCK_HEADER, VALVE_HEADER, Machine, bound_files
+from dzdesign.verify.toolchain.machines import BLOCK_HEADER, VALVE_HEADER, Machine, block_of, bound_files
 
 #: States that every verification compares: a second's work.
 STATES = 10_000_000
@@ -50,7 +50,7 @@ def read_controller(folder: Path) -> dict[str, str]:
     """Return the C code of a firmware's current controller, by file; one that is not there is a `RequirementError`."""
     try:
         core = {name: (folder / "core" / name).read_text(encoding="utf-8") for name in CORE}
-        bound = bound_files(folder)
+        bound = bound_files(block_of(folder))
         headers = [BLOCK_HEADER, *([] if bound else [VALVE_HEADER])]
         return core | {name: (folder / "core" / name).read_text(encoding="utf-8") for name in headers} | bound
     except (OSError, UnicodeDecodeError) as error:

@@ -21,7 +21,7 @@ from dzdesign.design.lot_valves import LotSide
 from dzdesign.identify.valve.above_tests import AboveTests
 from dzdesign.verify import requirements
 from dzdesign.verify.closed_loop.ramps import Curves, input_map_name, zero_command_name
-from dzdesign.verify.evidence import AboveCheck, InputCheck, InputCounts, LotCheck
+from dzdesign.verify.evidence import AboveCheck, InputCheck, InputCounts, LotCheck, OutputChecks, TriedInputs
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import Differences, PreparedInputs
 from dzdesign.verify.exhaustive.zero_command import (
@@ -143,6 +143,22 @@ def input_checks(inputs: InputCheck, units: RecordedUnits, *, both_signs: bool) 
     checks = [each.check(name=sign + each.title, holds=faults == 0, text=text) for each, faults, text in found]
     checks.insert(AFTER_ZERO_COMMAND, above_checked(inputs, units, sign))
     return checks
+
+
+def core_checks(folder: Path, compensator: Compensator, sign: int) -> OutputChecks:
+    """Try every input of one side of the C code that an output carries."""
+    prepared, core = PreparedInputs(ExactLaw(compensator, sign)), CompiledCore(folder, sign)
+    try:
+        found = input_check(prepared, core.sha256, core.check(prepared.everything()))
+    except RequirementError as error:
+        return OutputChecks(checks=(requirements.EXACT_LAW.check(holds=False, text=str(error)),))
+    both = len(compensator.signals.signs) > 1
+    checks = input_checks(found, compensator.valve.recorded_units, both_signs=both)
+    name, digest = f"core/{core.name}", found.outputs_hash
+    tried = TriedInputs(
+        name=f"{name}: codes, {found.side} commands", inputs=found.inputs, wrong=found.wrong, outputs_hash=digest
+    )
+    return OutputChecks(checks=tuple(replace(each, name=f"{name}: {each.name}") for each in checks), inputs=(tried,))
 
 
 def check_above(exact: ExactLaw, found: Differences, at_zero: np.ndarray) -> AboveCheck:

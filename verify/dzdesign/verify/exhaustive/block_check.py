@@ -7,9 +7,12 @@ One firmware in block form with the calibration blocks of many valves: each on e
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import product
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
+from zlib import crc32
 
+import numpy as np
 from msgspec import Meta
 
 from dzdesign.core.artefact_files import read_bytes, sha256_of
@@ -25,11 +28,16 @@ from dzdesign.verify.loop_results import about
 from dzdesign.verify.requirements import CALIBRATION_BLOCK, OWN_BLOCK, Check
 from dzdesign.verify.toolchain.compiled_core import CompiledCore
 from dzdesign.verify.toolchain.compiled_library import CompiledLibrary, Function
-from dzdesign.verify.toolchain.machines import ACCEPTANCE, BLOCK_HEADER, HOST, PROGRAMS, block_of, discard, stored
+from dzdesign.verify.toolchain.machines import ACCEPTANCE, BLOCK_HEADER, PROGRAMS, block_of
 
 PROGRAM = "own_block.c"
 #: Files of a target with the block as C, which are compiled here too.
 BLOCK_SOURCE, LINKED_HEADER = "dz_block.c", "dz_block.h"
+#: Octets of a block, and what is wrong with one; and of a firmware's own block.
+FUNCTIONS = (Function("dz_size", (), "uint32_t"), Function("dz_calibration_check", ("in",), "uint16_t"))
+OF_OWN = (*FUNCTIONS, Function("dz_linked", ("out",)), Function("dz_header", ("out",)))
+#: Words of the header, what of one is changed, and where the hash of the compensator stands.
+HEADER_WORDS, CHANGES, DIGEST_AT = 10, (0x0001, 0x0100, 0x8000, 0xFFFF), 20
 
 
 def own_block_accepted(folder: Path, manifest: FirmwareManifest) -> tuple[Check, ...]:
@@ -48,35 +56,61 @@ def own_block_accepted(folder: Path, manifest: FirmwareManifest) -> tuple[Check,
 
 def _tried(folder: Path, manifest: FirmwareManifest) -> tuple[str, str]:
     """Return what was found, and the first fault in words or an empty text."""
-    block = block_of(folder)
+    block, library = block_of(folder), _own_library(folder, manifest)
     if block is None:
         return "", f"core/ has no {ACCEPTANCE}, which every core in block form has"
-    sizes, found, damaged, digest = _numbers(folder, manifest, block)
-    (size, _), (refused, linked_refused, differ) = sizes, found
+    size, header = library.call("dz_size"), np.zeros(HEADER_WORDS, dtype="<u2")
     if len(block) != size:
         return "", f"{BLOCK_FILE} has {len(block)} octets, this firmware's block has {size}"
-    tried, accepted, header_tried, header_accepted, crc_follows = damaged
+    linked = np.zeros(size, dtype=np.uint8)
+    library.call("dz_linked", linked)
+    library.call("dz_header", header)
+
+    def refuses(octets: bytes) -> int:
+        return library.call("dz_calibration_check", octets)
+
+    bits = [_changed(block, at, 1 << at % 8) for at in range(size)]
+    headers = [_sealed(_changed(block, int(at), change)) for at, change in product(header, CHANGES)]
+    differ = sum(one != other for one, other in zip(block, linked.tobytes(), strict=True))
+    accepted, header_accepted = (sum(not refuses(each) for each in damaged) for damaged in (bits, headers))
+    refused, linked_refused = refuses(block), refuses(linked.tobytes())
     for is_fault, text in (
         (refused, f"dz_calibration_check() of this firmware refuses {BLOCK_FILE} (0x{refused:04X})"),
         (differ, f"{differ} octets of {BLOCK_SOURCE} are not those of {BLOCK_FILE}"),
         (linked_refused, f"dz_calibration_check() of this firmware refuses {BLOCK_SOURCE} (0x{linked_refused:04X})"),
-        (not crc_follows, f"the CRC-32 in {BLOCK_FILE} is not that of its octets"),
-        (accepted, f"dz_calibration_check() accepts {accepted} of {tried} blocks with one bit changed"),
-        (header_accepted, f"dz_calibration_check() accepts {header_accepted} of {header_tried} changed headers"),
-        (bytes(digest).hex() != _digest(folder), f"{BLOCK_FILE} is the block of another compensator.json"),
+        (_sealed(block) != block, f"the CRC-32 in {BLOCK_FILE} is not that of its octets"),
+        (accepted, f"dz_calibration_check() accepts {accepted} of {len(bits)} blocks with one bit changed"),
+        (header_accepted, f"dz_calibration_check() accepts {header_accepted} of {len(headers)} changed headers"),
+        (_named_digest(block) != _digest(folder), f"{BLOCK_FILE} is the block of another compensator.json"),
     ):
         if is_fault:
             return "", f"{text}; make the firmware again with `dzdesign codegen --calibration block`"
     text = f"{BLOCK_FILE} and {BLOCK_SOURCE} are one block of {size} octets, of this compensator.json, and accepted; "
-    return f"{text}refused: {tried} blocks with one bit changed, {header_tried} changed headers with a right CRC", ""
+    text += f"refused: {len(bits)} blocks with one bit changed, {len(headers)} changed headers with a right CRC"
+    return text, ""
+
+
+def _changed(block: bytes, at: int, change: int) -> bytes:
+    """Return a block with other bits in the word that begins there."""
+    word = int.from_bytes(block[at : at + 2], "little") ^ change
+    return block[:at] + word.to_bytes(2, "little")[: len(block) - at] + block[at + 2 :]
+
+
+def _sealed(block: bytes) -> bytes:
+    """Return a block with the CRC-32 of its octets, which stands last."""
+    return block[:-4] + crc32(block[:-4]).to_bytes(4, "little")
 
 
 def _digest(folder: Path) -> str:
     return sha256_of(read_bytes(folder / "compensator.json", "compensator of the firmware"))
 
 
-def _numbers(folder: Path, manifest: FirmwareManifest, block: bytes) -> list[list[int]]:
-    """Return the lines of numbers that programs/own_block.c prints; each file of the firmware is compiled alone."""
+def _named_digest(block: bytes) -> str:
+    return block[DIGEST_AT : DIGEST_AT + 32].hex()
+
+
+def _own_library(folder: Path, manifest: FirmwareManifest) -> CompiledLibrary:
+    """Return the check of blocks of a firmware, and its block as C."""
     linked = [folder / name for name in manifest.files if name.endswith(f"/{BLOCK_SOURCE}")]
     if len(linked) != 1:
         raise RequirementError(f"the manifest names {len(linked)} files {BLOCK_SOURCE}, expected one")
@@ -85,23 +119,8 @@ def _numbers(folder: Path, manifest: FirmwareManifest, block: bytes) -> list[lis
         BLOCK_SOURCE: linked[0], LINKED_HEADER: linked[0].with_name(LINKED_HEADER), PROGRAM: PROGRAMS / PROGRAM,
     }  # fmt: skip
     texts = {name: read_bytes(path, "file of a firmware in block form") for name, path in paths.items()}
-    headers = {name: texts[name] for name in (BLOCK_HEADER, LINKED_HEADER)}
-    objects = [
-        HOST.compile(name, {name: texts[name], **headers}, HOST.core_flags, f"the block's {name}")
-        for name in (ACCEPTANCE, BLOCK_SOURCE, PROGRAM)
-    ]
-    program = HOST.link(objects, "the check of the block")
-    try:
-        printed = HOST.run(program, [str(stored(block))], "dz_calibration_check()")
-    finally:
-        discard(block)
-    if [len(line) for line in printed] != [2, 3, 5, 32]:
-        raise RequirementError(f"the check of the block printed {len(printed)} lines of numbers, expected 4")
-    return printed
-
-
-#: Octets of a block, and what is wrong with one.
-FUNCTIONS = (Function("dz_size", (), "uint32_t"), Function("dz_calibration_check", ("in",), "uint16_t"))
+    sources = {name: content.decode(errors="surrogateescape") for name, content in texts.items()}
+    return CompiledLibrary(sources, OF_OWN, "dz_calibration_check()")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -182,8 +201,5 @@ class BlockFirmware:
 
     def _every_input(self, block: bytes, compensator: Compensator, sign: int) -> InputCheck:
         prepared = PreparedInputs(ExactLaw(compensator, sign))
-        core, inputs = CompiledCore(self._folder, sign, block), prepared.everything()
-        try:
-            return input_check(prepared, core.sha256, core.check(inputs))
-        finally:
-            discard(inputs, block)
+        core = CompiledCore(self._folder, sign, block)
+        return input_check(prepared, core.sha256, core.check(prepared.everything()))

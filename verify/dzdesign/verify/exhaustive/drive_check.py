@@ -14,8 +14,11 @@ from dzdesign.core.errors import RequirementError
 from dzdesign.design.compensator import Compensator
 from dzdesign.verify.exhaustive.exact_drive import STEP_UNIT, DriveModel
 from dzdesign.verify.requirements import DRIVE, Check
-from dzdesign.verify.toolchain.machines import HOST, PROGRAMS, bound_files, stored
+from dzdesign.verify.toolchain.compiled_library import CompiledLibrary, Function
+from dzdesign.verify.toolchain.machines import HOST, PROGRAMS, block_of, bound_files
 
+#: Of programs/drive.c: samples and ticks of each; codes, what is put, states; what was found.
+CHECK = Function("dz_check_drive", ("int32_t", "int32_t", "in", "in", "in", "both"))
 #: Codes of command, pressure A and pressure B.
 Codes = tuple[int, int, int]
 SEED, SAMPLES = 11, 3000
@@ -102,23 +105,6 @@ def ramp_places(compensator: Compensator, seed: int, count: int) -> list[int]:
         return int(rng.choice(ends) if rng.random() < 0.2 else rng.integers(*ends))
 
     return [place() if rng.random() < PUT_SHARE else STAYS for _ in range(count)]
-
-
-def window_samples(compensator: Compensator, used: Memory) -> list[Sample]:
-    """Return samples from either end to the window's edges, where the side changes, both channels being `used`."""
-    functions, command = compensator.drive_functions, compensator.signals.command
-    sensors = (compensator.signals.pressure_a, compensator.signals.pressure_b)
-    p_a, p_b = (sum(sensor.valid_codes) // 2 for sensor in sensors)
-    ramps = any(functions.ramp_up + functions.ramp_down)
-    signs = compensator.signals.signs
-    made = []
-    for sign in signs:
-        far = -sign * command.span(-sign) if len(signs) == 2 else 0
-        for step in (-1, 0, 1):
-            for away in (far, sign * max(functions.leave_zero_codes + step, 0)):
-                code = command.zero_code + command.direction(1) * away
-                made.append(Sample((code, p_a, p_b), away * STEP_UNIT if ramps else STAYS, memory=used))
-    return made
 
 
 def every_state(compensator: Compensator, used: Memory) -> list[Sample]:
@@ -250,7 +236,7 @@ class PreparedDrive:
         used = (needed, 0, needed, 0)
         drawn = zip(drive_samples(compensator, seed, count), ramp_places(compensator, seed, count), strict=True)
         states_put, memories_put = every_state(compensator, used), list(every_memory(compensator))
-        samples = [*window_samples(compensator, used), *(Sample(*each) for each in drawn), *states_put, *memories_put]
+        samples = [*(Sample(*each) for each in drawn), *states_put, *memories_put]
         self.samples = [each.codes for each in samples]
         #: How many of the samples are taken from a state that was put: every command, from each; and of how many the
         #: memory of faults is.
@@ -265,13 +251,14 @@ class PreparedDrive:
             for _ in range(self.ticks_per_sample):
                 model.tick()
                 states.append(model.state)
-        head = np.array([len(samples), self.ticks_per_sample], dtype="<i4")
-        codes = np.array(self.samples, dtype="<u2").tobytes()
-        sound = [STAYS if each.memory is None else each.memory[0] | each.memory[2] << 15 for each in samples]
-        faulty = [STAYS if each.memory is None else each.memory[1] | each.memory[3] << 15 for each in samples]
-        columns = ([each.place for each in samples], [each.word for each in samples], sound, faulty, states)
-        numbers = b"".join(np.array(each, dtype="<i4").tobytes() for each in columns)
-        self.content = head.tobytes() + codes + bytes(-len(codes) % 4) + numbers
+        self.codes, self.states = np.array(self.samples, dtype="<u2"), np.array(states, dtype="<i4")
+        #: What is put before each sample, as programs/drive.c has it.
+        self.puts = np.array([(each.place, each.word, *_memory_words(each.memory)) for each in samples], dtype="<i4")
+
+
+def _memory_words(memory: Memory | None) -> tuple[int, int]:
+    """Return the sound and the faulty samples that are put, those of command and pressures in one word."""
+    return (STAYS, STAYS) if memory is None else (memory[0] | memory[2] << 15, memory[1] | memory[3] << 15)
 
 
 def _put(model: DriveModel, sample: Sample) -> None:
@@ -290,7 +277,7 @@ class CompiledDrive:
 
     def __init__(self, folder: Path) -> None:
         self.sources = {path.name: path.read_bytes() for path in sorted((folder / "core").glob("*.[ch]"))}
-        self._bound = {name: text.encode() for name, text in bound_files(folder).items()}
+        self._bound = {name: text.encode() for name, text in bound_files(block_of(folder)).items()}
 
     def edited(self, name: str, text: bytes) -> "CompiledDrive":
         """Return the drive with another text in one of its files."""
@@ -313,11 +300,12 @@ class CompiledDrive:
         main = {name: text for name, text in {**self._bound, **self.sources}.items() if name.endswith(".h")}
         main["drive.c"] = (PROGRAMS / "drive.c").read_bytes()
         objects = [*self.objects(), HOST.compile("drive.c", main, HOST.check_flags, "the check of the drive")]
-        file = stored(prepared.content)
-        printed = HOST.run(HOST.link(objects, "the drive"), [str(file)], "the drive")
-        if not printed or len(printed[0]) != 4:
-            raise RequirementError(f"the drive's check reported {printed[:1]}, expected four numbers")
-        ticks, wrong, tick, field = printed[0]
+        found = np.zeros(4, dtype="<i4")
+        CompiledLibrary({}, [CHECK], "the drive", objects=objects).call(
+            CHECK.name, len(prepared.samples), prepared.ticks_per_sample, prepared.codes, prepared.puts,
+            prepared.states, found,
+        )  # fmt: skip
+        ticks, wrong, tick, field = found.tolist()
         words = None
         if wrong:
             sample = (tick - 1) // prepared.ticks_per_sample - 1

@@ -1,6 +1,6 @@
 """Every input and the exactly rounded law at it, as integers that a C program can step through on any machine.
 
-The layouts are those of programs/every_input.h. All arithmetic here is in integers of any length.
+All arithmetic here is in integers of any length.
 """
 
 from dataclasses import dataclass
@@ -11,10 +11,10 @@ import numpy as np
 
 from dzdesign.core.errors import RequirementError
 from dzdesign.verify.exhaustive.exact_law import BETA_UNIT, ExactLaw
+from dzdesign.verify.toolchain.compiled_core import DIRECTION, PAIR, PART, PLAN, ROW
 
 #: Codes beyond the converter's range: the largest that 16 bits hold.
 OUTSIDE = 65535
-PARTS, TURNS = 8, 6
 #: Remainders and their sums fit 64 bits with a sign below this.
 LARGEST_DENOMINATOR = 2**62
 #: Of a sample: rows and places (commands), and which of the codes of 16 bits; 257 divides 65535.
@@ -23,17 +23,6 @@ SAMPLED_ROWS, SAMPLED_PLACES, SAMPLED_STRIDE = 32, 200, 257
 SPREAD = 40503
 #: Above every numerator of beta.
 KEY = 2**31
-SCALARS = (
-    "parts", "codes", "first_code", "code_step", "sound_from", "sound_to", "zero_place", "zero_code", "compare_limit",
-    "a_low", "a_high", "b_low", "b_high", "turn", "reverse", "lowest", "safe_law", "safe_at_zero", "rows", "pairs",
-    "places", "stride", "cube", "impatient", "laws_at", "rows_at", "directions_at", "slant_at", "pairs_at",
-    "places_at", "betas_at", "tested_to",
-)  # fmt: skip
-PLAN = np.dtype([("denominator", "<i8", PARTS), ("part_end", "<i4", PARTS), *((name, "<i4") for name in SCALARS)])
-PART = np.dtype([("remainder", "<i8"), ("carry", "<i8"), ("quotient", "<i4"), ("step", "<i4")])
-ROW = np.dtype([("offset", "<i4"), ("b_low", "<u2"), ("pairs", "<u2"), ("first", "<u2"), ("law", "<u2")])
-DIRECTION = np.dtype([("until", "<i4", TURNS), ("sign", "<i2", TURNS)])
-PAIR = np.dtype([("a", "<u2"), ("b", "<u2"), ("sound", "<u2")])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -131,6 +120,14 @@ class PreparedInputs:
         near = {place + by for place in corners for by in (-1, 0, 1)}
         spread = set(np.linspace(0, self._codes - 1, SAMPLED_PLACES).astype(int).tolist())
         return np.array(sorted(place for place in near | spread if 0 <= place < self._codes))
+
+    def sampled_codes(self) -> list[tuple[int, int, int]]:
+        """Return the command's codes at some places, each with pressure codes of some rows and with ones not sound."""
+        found, rows = self.differences, self.sampled_rows()
+        b = found.b_first[rows]
+        pairs = [*zip((self.exact.turn * found.values[rows] + found.slant[b]).tolist(), b.tolist(), strict=True)]
+        pairs += self._fallback_pairs()[["a", "b"]].tolist()
+        return [(self.code_at(place), *pair) for place in self.sampled_places().tolist() for pair in pairs]
 
     def _corner_numerators(self, both: np.ndarray) -> tuple[int, list[tuple[int, np.ndarray]]]:
         """Return the law at its corners, in counts and a half over one denominator, for all pairs of betas."""

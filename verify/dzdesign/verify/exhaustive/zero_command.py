@@ -9,11 +9,12 @@ is zero. A code stands for all pressures that may have made it; what of a dither
 drive.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import accumulate, pairwise
 from math import ceil, lcm
+from typing import Any
 
 import numpy as np
 
@@ -24,64 +25,27 @@ from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import Differences
 
 
-@dataclass(frozen=True, slots=True)
-class _Parabola:
-    """A + B s + C s² from `start` on, s in units of `width`; MPa and V."""
+def sagging_least(bounds: LotSide, low_MPa: np.ndarray, high_MPa: np.ndarray) -> np.ndarray:
+    """Return the least that a threshold of limited curvature, straight for M = 0, may be over many intervals, V.
 
-    start: Fraction
-    width: Fraction
-    coefficients: tuple[Fraction, Fraction, Fraction]
-
-    def at(self, share: Fraction) -> Fraction:
-        constant, linear, square = self.coefficients
-        return constant + share * (linear + share * square)
-
-    @property
-    def lowest(self) -> Fraction | None:
-        """Where the slope is zero, as a share; None of a straight line."""
-        _, linear, square = self.coefficients
-        return -linear / (2 * square) if square else None
-
-
-class SaggingBound:
-    """What is known of a threshold of limited curvature, straight for M = 0, over its tested interval."""
-
-    def __init__(self, bounds: LotSide) -> None:
-        nodes = [Fraction(repr(dp)) for dp in bounds.dp_MPa]
-        lower = [Fraction(repr(value)) for value in bounds.u_lower_V]
-        self._parabolas = []
-        for (a, b), (low, high), bend in zip(pairwise(nodes), pairwise(lower), bounds.curvature_V_MPa2, strict=True):
-            sag = Fraction(repr(bend)) * (b - a) ** 2 / 2
-            self._parabolas.append(_Parabola(a, b - a, (low, high - low - sag, sag)))
-
-    def least(self, low_MPa: Fraction, high_MPa: Fraction) -> Fraction:
-        """Return the least value over an interval, as far as tests reach, V; the interval touches the tested one."""
-        return min(value for part in self._parabolas for value in self._values(part, low_MPa, high_MPa))
-
-    @staticmethod
-    def _values(part: _Parabola, low_MPa: Fraction, high_MPa: Fraction) -> Iterator[Fraction]:
-        first, last = ((end - part.start) / part.width for end in (low_MPa, high_MPa))
-        if last < 0 or first > 1:
-            return
-        first, last = max(first, Fraction(0)), min(last, Fraction(1))
-        yield from (part.at(first), part.at(last))
-        if part.lowest is not None and first < part.lowest < last:
-            yield part.at(part.lowest)
-
-    def least_in_doubles(self, low_MPa: np.ndarray, high_MPa: np.ndarray) -> np.ndarray:
-        """Return the same of many intervals in double precision; infinite for one that no test reaches."""
-        found = np.full(low_MPa.shape, np.inf)
-        for part in self._parabolas:
-            start, width = float(part.start), float(part.width)
-            constant, linear, square = map(float, part.coefficients)
-            first, last = (low_MPa - start) / width, (high_MPa - start) / width
-            inside = (last >= 0) & (first <= 1)
-            first, last = np.clip(first, 0, 1), np.clip(last, 0, 1)
-            lowest = np.clip(-linear / (2 * square), first, last) if square else first
-            for share in (first, last, lowest):
-                value = constant + share * (linear + share * square)
-                found = np.where(inside, np.minimum(found, value), found)
-        return found
+    Each as far as tests reach; infinite for one that no test reaches. Of fractions it is exact, of doubles in doubles.
+    """
+    kind: Any = Fraction if low_MPa.dtype == object else float
+    nodes = [Fraction(repr(dp)) for dp in bounds.dp_MPa]
+    lower = [Fraction(repr(value)) for value in bounds.u_lower_V]
+    found = np.full(low_MPa.shape, np.inf, dtype=low_MPa.dtype)
+    for (a, b), (begin, end), bend in zip(pairwise(nodes), pairwise(lower), bounds.curvature_V_MPa2, strict=True):
+        sag = Fraction(repr(bend)) * (b - a) ** 2 / 2
+        # A + B s + C s² from `start` on, s in units of `width`.
+        start, width, constant, linear, square = map(kind, (a, b - a, begin, end - begin - sag, sag))
+        first, last = (low_MPa - start) / width, (high_MPa - start) / width
+        inside = (last >= 0) & (first <= 1)
+        first, last = np.clip(first, kind(0), kind(1)), np.clip(last, kind(0), kind(1))
+        lowest = np.clip(-linear / (2 * square), first, last) if square else first
+        for share in (first, last, lowest):
+            value = constant + share * (linear + share * square)
+            found = np.where(inside, np.minimum(found, value), found)
+    return found
 
 
 #: Margins that differ by less than this in doubles, V, are compared exactly.
@@ -232,6 +196,15 @@ def bounds_at(drops: PressureDrops, bounds: LotSide) -> np.ndarray:
     return _known(drops, bounds)[0]
 
 
+def bound_at(bounds: LotSide, dp_MPa: float) -> Fraction:
+    """Return what is known of a valve's threshold at a pressure drop, V; beyond the tests what is at their end."""
+    tested = [Fraction(repr(dp)) for dp in bounds.dp_MPa]
+    at = min(max(Fraction(repr(dp_MPa)), min(tested)), max(tested))
+    scale = lcm(at.denominator, *(dp.denominator for dp in tested))
+    place = np.array([int(at * scale)])
+    return _known(PressureDrops(scale=scale, least=place, most=place, made=np.array([True])), bounds)[1](0)
+
+
 def _known(drops: PressureDrops, bounds: LotSide) -> tuple[np.ndarray, Callable[[int], Fraction]]:
     """Return what is known of a threshold, V: in doubles at each difference, and exactly at one."""
     if bounds.premise == "monotone" or len(bounds.dp_MPa) == 1:  # all between the tests follows from monotony
@@ -239,10 +212,9 @@ def _known(drops: PressureDrops, bounds: LotSide) -> tuple[np.ndarray, Callable[
         steps = drops.steps_of(staircase)
         values = np.where(steps >= 0, np.array(staircase.bounds_V, dtype=float)[steps], np.nan)
         return values, lambda row: staircase.bounds_V[int(steps[row])]
-    sagging = SaggingBound(bounds)
-    known = sagging.least_in_doubles(*(each.astype(float) / drops.scale for each in (drops.least, drops.most)))
+    known = sagging_least(bounds, *(each.astype(float) / drops.scale for each in (drops.least, drops.most)))
     values = np.where(drops.made & np.isfinite(known), known, np.nan)
-    return values, lambda row: sagging.least(*drops.ends(row))
+    return values, lambda row: sagging_least(bounds, *(np.array([end], dtype=object) for end in drops.ends(row)))[0]
 
 
 def counted_dither(compensator: Compensator) -> int:

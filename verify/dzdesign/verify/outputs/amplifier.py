@@ -1,23 +1,19 @@
 """What is checked of an amplifier's file, as it is read back, and of the table of dead zones beside it in a folder."""
 
-import re
+import csv
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from fractions import Fraction
-from itertools import groupby
-from math import inf
 from pathlib import Path
-from typing import NamedTuple
 
 from dzdesign.core.artefact_files import read_bytes
 from dzdesign.core.errors import InputError, quoted
 from dzdesign.core.option_readers import percent
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.costs_at_tests import remaining_dead_zone
 from dzdesign.design.firmware_manifest import OutputManifest
 from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.verify.evidence import OutputChecks
 from dzdesign.verify.outputs.amplifier_files import FileLaw, read_file
-from dzdesign.verify.requirements import DEAD_ZONES, LAW_DEAD_ZONES, READ_BACK, SAFE, Check
+from dzdesign.verify.requirements import DEAD_ZONES, READ_BACK, SAFE, Check
 
 #: Pressure drops between the tests of each side, beside the tests themselves.
 PLACES = 1000
@@ -30,9 +26,8 @@ ROUNDED = 0.51e-6
 EXACT_ZERO = ("rmc", "rmc75")
 #: Devices with one offset, which acts on commands of both signs whatever the design has.
 BOTH_SIGNS = EXACT_ZERO
-#: Of the folder: its table, and a line of it; no command opens the valve where a share is infinite.
-TABLE, HEADER = "dead_zones.csv", "side,dp_MPa,branch,dead_zone_fixed,dead_zone_law"
-LINE = re.compile(r"([a-z]+),(\d{1,9}\.\d{6}),([a-z]+),(\d{1,9}\.\d{6}|inf),(\d{1,9}\.\d{6}|inf)", re.ASCII)
+#: Of the folder; no command opens the valve where a share in it is infinite.
+TABLE = "dead_zones.csv"
 #: Of one side: pressure drop, MPa, and share of command to the knee by branch.
 Stated = tuple[float, Mapping[str, float]]
 
@@ -121,7 +116,7 @@ def _dead_zones(
     laws: Mapping[int, FileLaw], compensator: Compensator, stated: Mapping[int, Sequence[Stated]]
 ) -> Check:
     """Look for the command at which the drive reaches each knee, and compare it with what was stated."""
-    compared, largest = 0, 0.0
+    apart: list[float] = []
     for sign in compensator.signals.signs:
         tests = compensator.valve.sides[SIDE_NAMES[sign]].tests
         if len(stated.get(sign, ())) != len(tests):
@@ -134,9 +129,9 @@ def _dead_zones(
                 return DEAD_ZONES.check(holds=False, text=f"no test has the values stated at {dp_MPa:g} MPa")
             for branch, knee in recorded.items():
                 found = _dead_zone(laws[sign], Fraction(repr(knee)) / compensator.u_max_V)
-                compared, largest = compared + 1, max(largest, abs(min(found, 2.0) - min(shares[branch], 2.0)))
-    text = f"{compared} values compared, at most {largest:.4%} of command apart"
-    return DEAD_ZONES.check(holds=largest <= float(ALLOWED), text=text)
+                apart.append(abs(min(found, 2.0) - min(shares[branch], 2.0)))
+    text = f"{len(apart)} values compared, at most {max(apart, default=0.0):.4%} of command apart"
+    return DEAD_ZONES.check(holds=all(each <= ALLOWED for each in apart), text=text)
 
 
 def _dead_zone(law: FileLaw, threshold: Fraction) -> float:
@@ -164,16 +159,11 @@ def checks(
     except InputError as error:
         return OutputChecks(checks=(READ_BACK.check(holds=False, text=str(error)),))
     try:
-        rows = read_table(read_bytes(folder / TABLE, "table of dead zones"))
+        stated = _table_of(read_bytes(folder / TABLE, "table of dead zones"))
     except InputError as error:
         found = [each for each in file_checks(device, content, compensator, {}, zero) if each.id != DEAD_ZONES.id]
         return OutputChecks(checks=(*found, DEAD_ZONES.check(holds=False, text=str(error))))
-    signs = {SIDE_NAMES[sign]: sign for sign in compensator.signals.signs}
-    stated: dict[int, list[Stated]] = {}
-    for (side, dp_MPa), of_test in groupby(rows, key=lambda row: row[:2]):
-        stated.setdefault(signs.get(side, 0), []).append((dp_MPa, {row.branch: row.fixed for row in of_test}))
-    of_file = file_checks(device, content, compensator, stated, zero)
-    return OutputChecks(checks=(*of_file, _law_dead_zones(rows, compensator)))
+    return OutputChecks(checks=file_checks(device, content, compensator, stated, zero))
 
 
 def _file_for(folder: Path, manifest: OutputManifest, device: str) -> bytes:
@@ -184,49 +174,14 @@ def _file_for(folder: Path, manifest: OutputManifest, device: str) -> bytes:
     return read_bytes(folder / names[0], f"file for {device}")
 
 
-class Row(NamedTuple):
-    """A line of the table: a branch of one test, and the share of command to its knee by both compensations."""
-
-    side: str
-    dp_MPa: float
-    branch: str
-    fixed: float
-    law: float
-
-    def __str__(self) -> str:
-        return f"{self.law:.6f} on {self.branch} at {self.dp_MPa:.6f} MPa of the {self.side} side"
-
-
-def read_table(content: bytes) -> list[Row]:
-    """Return the lines of a table of dead zones; what is none is an `InputError` with the line."""
-    header, *lines = content.decode("ascii", "replace").splitlines() or [""]
-    if header != HEADER:
-        raise InputError(f"{TABLE} begins with {quoted(header)}, expected {HEADER}")
-    rows = []
-    for number, line in enumerate(lines, start=2):
-        found = LINE.fullmatch(line)
-        if found is None:
-            raise InputError(f"{TABLE}, line {number}, is {quoted(line)}, expected {HEADER}, with six decimals")
-        side, dp_MPa, branch, fixed, law = found.groups()
-        rows.append(Row(side, float(dp_MPa), branch, float(fixed), float(law)))
-    return rows
-
-
-def _law_dead_zones(rows: Sequence[Row], compensator: Compensator) -> Check:
-    """Compare every line with the design: its side, test and branch, and the share that the law leaves there."""
-    expected = [
-        Row(SIDE_NAMES[sign], test.dp_MPa or 0.0, branch, inf, share)
-        for sign in compensator.signals.signs
-        for test in compensator.valve.sides[SIDE_NAMES[sign]].tests
-        for branch, share in remaining_dead_zone(compensator, test, sign).items()
-    ]
-    if len(rows) != len(expected):
-        text = f"{len(rows)} lines, expected {len(expected)}: one for each branch of each test"
-        return LAW_DEAD_ZONES.check(holds=False, text=text)
-    for number, (row, wanted) in enumerate(zip(rows, expected, strict=True), start=2):
-        same = row.law == wanted.law or abs(row.law - wanted.law) <= ROUNDED
-        named = (row.side, row.branch) == (wanted.side, wanted.branch) and abs(row.dp_MPa - wanted.dp_MPa) <= ROUNDED
-        if not (named and same):
-            text = f"{TABLE}, line {number}: it states {row}, expected {wanted}"
-            return LAW_DEAD_ZONES.check(holds=False, text=text)
-    return LAW_DEAD_ZONES.check(holds=True, text=f"{len(rows)} lines, one for each branch of each test")
+def _table_of(content: bytes) -> dict[int, list[Stated]]:
+    """Return what a table of dead zones states of the file, by the sign of command; the design's stands beside it."""
+    signs: dict[str, int] = {name: sign for sign, name in SIDE_NAMES.items()}
+    tests: dict[tuple[int, float], dict[str, float]] = {}
+    try:
+        for row in csv.DictReader(content.decode("ascii").splitlines()):
+            place = signs[row["side"]], float(row["dp_MPa"])
+            tests.setdefault(place, {})[row["branch"]] = float(row["dead_zone_fixed"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"{TABLE} can't be read: {type(error).__name__}, {error}") from error
+    return {sign: [(dp_MPa, shares) for (at, dp_MPa), shares in tests.items() if at == sign] for sign in signs.values()}

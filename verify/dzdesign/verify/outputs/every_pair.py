@@ -25,9 +25,8 @@ State = tuple[np.ndarray, np.ndarray]
 Piece = TypeVar("Piece")
 #: Pressures of a PLC, 0.1 bar, whose differences are tried with every command, and those tried at zero command.
 PLC_PRESSURES, PLC_AROUND = (0, 4000), (-300, 4300)
-#: Pressure drops whose law is made at once, inputs that a program is given at once, one that starts anew for each, and
-#: processors that share them.
-PIECE, AT_ONCE, STARTED_ANEW, SIDE_BY_SIDE = 256, 1 << 17, 1 << 20, min(os.cpu_count() or 1, 4)
+#: Pressure drops whose law is made at once, inputs that a program is given at once, and processors that share them.
+PIECE, AT_ONCE, SIDE_BY_SIDE = 256, 1 << 17, min(os.cpu_count() or 1, 4)
 #: Pressures that are tried with commands of all sizes: how many pairs, every which command, and the seed.
 SAMPLE, STRIDE, SEED = 256, 7, 61131
 #: Spreads the pairs of pressures that pressure drops are tried with: 2^16 over the golden ratio.
@@ -121,7 +120,9 @@ Known = tuple[_Law, np.ndarray] | None
 class EveryPair:
     """A program, ready to be tried; one of a single side that remembers nothing has no states."""
 
-    def __init__(self, compensator: Compensator, interface: str, signs: Sequence[int], *, remembers: bool) -> None:
+    def __init__(
+        self, compensator: Compensator, interface: str, signs: Sequence[int], *, remembers: bool, at_once: int = AT_ONCE
+    ) -> None:
         self.laws = [_Law(ExactBlock(compensator, sign, interface)) for sign in signs]
         self.both, self.remembers, first = len(signs) == 2, remembers, self.laws[0].exact
         self.exact, self.of_codes = first, interface == "codes"
@@ -129,7 +130,7 @@ class EveryPair:
         #: What may be remembered: driven side and whether at rest; a new instance's first.
         sides, rests = (0, 1, -1) if self.both else (1,), (1, 0) if self.rests else (1,)
         self.states = [(side, rest) for side in sides for rest in rests]
-        self.at_once = AT_ONCE
+        self.at_once = at_once
         self.low, self.high = (0, first.code_max) if self.of_codes else PLC_PRESSURES
 
     def every_command(self, program: Program, place: int, drops: range | None = None) -> Tried:
@@ -215,9 +216,8 @@ class EveryPair:
         return reduce(Tried.and_then, found)
 
     def _given(self, command: np.ndarray, a: np.ndarray, b: np.ndarray, state: State) -> dict[str, np.ndarray]:
-        kind = np.int32 if self.remembers else np.int64
-        given = {"command": command.astype(kind), "pressure_a": a.astype(kind), "pressure_b": b.astype(kind)}
-        given |= {"side": state[0].astype(kind)} if self.both else {}
+        given = {"command": command, "pressure_a": a, "pressure_b": b} | ({"side": state[0]} if self.both else {})
+        given = {name: each.astype(np.int64) for name, each in given.items()}
         return given | ({"at_rest": state[1]} if self.rests else {})
 
     def _judged(

@@ -2,9 +2,8 @@
 
 import json
 import shutil
-import sys
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from fractions import Fraction
 from importlib.util import find_spec
 from math import floor, isclose
@@ -12,27 +11,26 @@ from pathlib import Path
 
 import numpy as np
 
-from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.errors import InputError, RequirementError, and_more
 from dzdesign.core.scratch import scratch_folder
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import OutputManifest
+from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.verify import requirements
 from dzdesign.verify.closed_loop.loop import BENCH_BACK_MPA, ClosedLoop
 from dzdesign.verify.closed_loop.plant import Plant
-from dzdesign.verify.evidence import OutputChecks, TriedInputs
-from dzdesign.verify.exhaustive.all_inputs import input_check, input_checks
+from dzdesign.verify.evidence import OutputChecks
+from dzdesign.verify.exhaustive.all_inputs import core_checks
 from dzdesign.verify.exhaustive.drive_check import drive_samples
 from dzdesign.verify.exhaustive.exact_drive import DriveModel
-from dzdesign.verify.exhaustive.exact_law import ExactLaw
+from dzdesign.verify.exhaustive.exact_law import BETA_UNIT, ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import PreparedInputs
-from dzdesign.verify.loop_results import Side
-from dzdesign.verify.outputs.fmu_importer import binary_here, run_in_child
+from dzdesign.verify.outputs.fmu_importer import Row, binary_here, run_in_child
 from dzdesign.verify.requirements import Check
-from dzdesign.verify.toolchain.compiled_core import ENDINGS, CompiledCore
-from dzdesign.verify.toolchain.machines import HOST, Machine, stored
+from dzdesign.verify.toolchain.compiled_core import ENDINGS
 
 Say = Callable[[str], None]
+Codes = tuple[int, int, int]
 INSTALL = 'FMPy, which runs FMUs, is not installed; run `pip install "fmpy>=0.3.20,<0.4"`'
 COMPENSATOR, PLANT = "dz_compensator", "dz_plant"
 #: Of the drive: samples and their seed; of V and MPa: rows.
@@ -40,14 +38,11 @@ DRIVE_SAMPLES, SEED, PHYSICAL_ROWS = 3000, 25, 4000
 #: Of a code, as near its border as this the rounding of a double decides.
 AT_BORDER = Fraction(1, 10**6)
 CODES, VALUES = ("u_i_code", "p_A_code", "p_B_code"), ("u_i", "p_A", "p_B")
-#: Loads a binary by itself: of Windows without flags.
-FMU_HOST = replace(HOST, link_flags=("-ldl",) if sys.platform.startswith("linux") else (), run_timeout_s=300.0)
 #: Of the closed loop: share of the largest flow that is allowed, and the command over time: rest, up, full, down, rest,
 #: then steps; s and shares of full command.
 TOLERANCE = 1e-4
 COURSE = ((0.0, 0.0), (0.1, 0.0), (0.5, 1.0), (0.55, 1.0), (0.9, 0.0), (1.0, 0.0), (1.0, 0.5), (1.1, 0.5),
           (1.1, 0.02), (1.2, 0.02), (1.2, 1.0), (1.3, 0.0), (1.4, 0.0))  # fmt: skip
-SIDES: Mapping[int, Side] = {1: "positive", -1: "negative"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,9 +51,6 @@ class Unpacked:
 
     name: str
     folder: Path
-    guid: str
-    #: Name to value reference.
-    references: Mapping[str, int]
     binary: Path | None
     problems: tuple[str, ...]
 
@@ -81,13 +73,20 @@ def checks(folder: Path, manifest: OutputManifest, compensator: Compensator, say
         if any(fmu.binary is None for fmu in fmus):
             text = "there is no binary for this machine; verify on Linux, on x86_64 Windows, or on macOS"
             return OutputChecks(checks=(valid, requirements.EXACT_LAW.check(holds=None, text=text)), inputs=())
-        say(f"trying every input of {fmus[0].name}")
-        found, tried = input_results(fmus[0], compensator)
-        found += [drive_check(fmus[0], compensator), physical_check(fmus[0], compensator)]
+        say(f"trying every input of the C code of {fmus[0].name}")
+        # The core that the FMU carries as sources, where a check finds it.
+        firmware = place / "firmware"
+        shutil.copytree(fmus[0].folder / "sources", firmware / "core")
+        of_core = [core_checks(firmware, compensator, sign) for sign in compensator.signals.signs]
+        say(f"comparing {fmus[0].name} with the exact law and the exact drive")
+        found = [check(fmus[0], compensator) for check in (law_check, drive_check, physical_check)]
         for plant_fmu in fmus[1:]:
             say(f"running {fmus[0].name} with {plant_fmu.name}")
-            found.append(closed_loop_check(fmus[0], plant_fmu, Plant(**plant), compensator))
-    return OutputChecks(checks=(valid, *found), inputs=tuple(tried))
+            found.append(closed_loop_check(fmus[0], plant_fmu, Plant(**plant), compensator, firmware))
+    return OutputChecks(
+        checks=(valid, *(check for each in of_core for check in each.checks), *found),
+        inputs=tuple(each for side in of_core for each in side.inputs),
+    )
 
 
 def plant_of(manifest: OutputManifest) -> dict[str, float]:
@@ -114,67 +113,11 @@ def unpacked(path: Path, place: Path) -> Unpacked:
         described = fmpy.read_model_description(str(folder))
         if path.stem == COMPENSATOR and described.modelExchange is None:
             problems += ("it offers no Model Exchange",)
-        guid, identifier = described.guid, described.coSimulation.modelIdentifier
-        references = {each.name: each.valueReference for each in described.modelVariables}
+        binary = binary_here(folder, described.coSimulation.modelIdentifier)
     except Exception as error:  # FMPy raises what its parsers do
         problems = (f"FMPy can't read it: {str(error)[:200]}",)
-        return Unpacked(name=path.name, folder=folder, guid="", references={}, binary=None, problems=problems)
-    return Unpacked(
-        name=path.name, folder=folder, guid=guid, references=references, binary=binary_here(folder, identifier),
-        problems=problems,
-    )  # fmt: skip
-
-
-class FmuCore(CompiledCore):
-    """One side of the law behind the getters of an FMU's binary, called as the check of every input calls a core."""
-
-    def __init__(self, fmu: Unpacked, sign: int, binary: bytes) -> None:
-        self._ending = ENDINGS[sign]
-        self.name, self.block, self._binary = "core_of_fmu.c", None, binary
-        program = Path(__file__).parent / "programs" / self.name
-        self.sources = {self.name: program.read_bytes()}
-        of_side = {"COMPARE": "compare", "STATUS": "status", "BETA": "beta"}
-        names = {name.upper(): name for name in (*CODES, "codes")}
-        names |= {macro: f"{name}{self._ending}" for macro, name in of_side.items()}
-        self._references = tuple(f"-DREF_{macro}={fmu.references[name]}" for macro, name in names.items())
-        self._token = fmu.guid
-
-    @property
-    def sha256(self) -> str:
-        """SHA-256 of the binary."""
-        return sha256_of(self._binary)
-
-    def compiled(self, machine: Machine = FMU_HOST) -> Path:
-        """Return the object of what calls the binary."""
-        called = {"DZ_CORE": "comp", "DZ_STATUS": "status", "DZ_BETA": "beta"}
-        names = (f"-D{macro}=dz_{name}{self._ending}" for macro, name in called.items())
-        path = str(stored(self._binary)).replace("\\", "\\\\")
-        texts = (f'-DFMU_PATH="{path}"', f'-DFMU_TOKEN="{self._token}"')
-        flags = (*machine.check_flags, *names, *self._references, *texts)
-        return machine.compile(self.name, self.sources, flags, "the check of an FMU")
-
-
-def input_results(fmu: Unpacked, compensator: Compensator) -> tuple[list[Check], list[TriedInputs]]:
-    """Compare each side of the law behind the getters with the exact law on every input."""
-    found, tried = list[Check](), list[TriedInputs]()
-    for sign in compensator.signals.signs:
-        prepared = PreparedInputs(ExactLaw(compensator, sign))
-        core = FmuCore(fmu, sign, fmu.binary.read_bytes() if fmu.binary else b"")
-        try:
-            # The object that was run is the FMU's binary; that of the check around it has a path of this machine in it.
-            answers = replace(core.check(prepared.everything(), FMU_HOST), object_sha256=core.sha256)
-            inputs = input_check(prepared, core.sha256, answers)
-        except RequirementError as error:
-            found.append(requirements.EXACT_LAW.check(holds=False, text=str(error), name=fmu.name))
-            continue
-        found += input_checks(
-            inputs, compensator.valve.recorded_units, both_signs=len(compensator.signals.signs) == 2
-        )
-        name = f"codes, {inputs.side} commands"
-        tried.append(
-            TriedInputs(name=name, inputs=inputs.inputs, wrong=inputs.wrong, outputs_hash=inputs.outputs_hash)
-        )
-    return found, tried
+        return Unpacked(name=path.name, folder=folder, binary=None, problems=problems)
+    return Unpacked(name=path.name, folder=folder, binary=binary, problems=problems)
 
 
 def _check(requirement: requirements.Requirement, faults: Iterator[str], text: str) -> Check:
@@ -183,6 +126,36 @@ def _check(requirement: requirements.Requirement, faults: Iterator[str], text: s
     except RequirementError as error:
         return requirement.check(holds=False, text=str(error))
     return requirement.check(holds=not found, text=and_more(found, 2) if found else text)
+
+
+def _law_faults(
+    fmu: Unpacked, compensator: Compensator, names: tuple[str, ...], rows: list[Row], codes: list[Codes]
+) -> Iterator[str]:
+    """Yield where what the FMU shows of both sides, given `rows`, is not the exact law at their codes."""
+    signals, drive = compensator.signals, compensator.current_drive
+    full = float(compensator.u_max_V if drive is None else drive.circuit.rated_A)
+    outputs = [f"{name}{ENDINGS[sign]}" for sign in signals.signs for name in ("compare", "status", "beta", "u_O")]
+    found = np.array(run_in_child(
+        "stepped", f"the law of {fmu.name}", folder=str(fmu.folder), names=names, rows=rows, codes=names == CODES,
+        outputs=outputs, step_s=1 / signals.tick_Hz, exchange=True,
+    ))[:, :-1]  # fmt: skip
+    must = []
+    for exact in (ExactLaw(compensator, sign) for sign in signals.signs):
+        answers = np.array([exact.answer(*each) for each in codes], dtype=float)
+        must += [*(answers / (1, 1, BETA_UNIT)).T, answers[:, 0] * full / signals.compare_max]
+    wrong = ~np.isclose(found, np.array(must).T, rtol=1e-9, atol=1e-9).all(axis=1)
+    for index in np.flatnonzero(wrong):
+        shown, expected = (dict(zip(outputs, row, strict=True)) for row in (found[index], np.array(must).T[index]))
+        yield f"{', '.join(names)} = {np.round(rows[index], 6).tolist()} give {shown}, expected {expected}"
+
+
+def law_check(fmu: Unpacked, compensator: Compensator) -> Check:
+    """Compare law, status and beta of the binary with the exact law, at a sample of the codes and their ends."""
+    laws = (ExactLaw(compensator, sign) for sign in compensator.signals.signs)
+    codes = [each for exact in laws for each in PreparedInputs(exact).sampled_codes()]
+    text = f"{len(codes)} inputs in codes, at the ends of all that is valid and between them: 0 differ"
+    rows = [list(map(float, each)) for each in codes]
+    return _check(requirements.FMU_LAW, _law_faults(fmu, compensator, CODES, rows, codes), text)
 
 
 def drive_check(fmu: Unpacked, compensator: Compensator) -> Check:
@@ -219,41 +192,26 @@ def _drive_faults(fmu: Unpacked, compensator: Compensator) -> Iterator[str]:
 
 
 def physical_check(fmu: Unpacked, compensator: Compensator) -> Check:
-    """Compare the law at inputs in V and MPa with that at the codes of an ideal converter, which every input tried."""
-    text = f"{PHYSICAL_ROWS} random inputs in V and MPa, 0 differ from those of their codes"
+    """Compare the law at inputs in V and MPa with the exact one at the codes of an ideal converter."""
+    text = f"{PHYSICAL_ROWS} random inputs in V and MPa, 0 differ from the exact law of their codes"
     return _check(requirements.FMU_UNITS, _physical_faults(fmu, compensator), text)
 
 
 def _physical_faults(fmu: Unpacked, compensator: Compensator) -> Iterator[str]:
     signals, rng, u_max = compensator.signals, np.random.default_rng(SEED), float(compensator.u_max_V)
-    drive = compensator.current_drive
-    full = u_max if drive is None else float(drive.circuit.rated_A)
     spans = [float(sensor.span_MPa) for sensor in (signals.pressure_a, signals.pressure_b)]
     low = -u_max if len(signals.signs) == 2 else 0.0
     rows = rng.uniform([low, 0.0, 0.0], [u_max, *spans], (PHYSICAL_ROWS, 3))
     rows[::7, 1] = rows[::7, 2] + rng.uniform(0, spans[0] / 4, rows[::7].shape[0])  # pressure drops as tested
     rows[::7, 1] = np.minimum(rows[::7, 1], spans[0])
     rows[:5, 0] = 0.0
-    pairs = [(row, codes) for row in rows.tolist() if (codes := _codes(compensator, row))]
-    outputs = [f"{name}{ENDINGS[sign]}" for sign in signals.signs for name in ("compare", "u_O")]
-    of_values, of_codes = (
-        np.array(run_in_child(
-            "stepped", f"the law of {fmu.name}", folder=str(fmu.folder), names=names, rows=given, codes=names == CODES,
-            outputs=outputs, step_s=1 / signals.tick_Hz, exchange=False,
-        ))
-        for names, given in zip((VALUES, CODES), zip(*pairs, strict=True), strict=True)
-    )  # fmt: skip
-    must = np.repeat(of_codes[:, ::2], 2, axis=1)
-    must[:, 1::2] *= full / signals.compare_max
-    wrong = ~np.isclose(of_values, must, rtol=1e-9, atol=1e-9).all(axis=1)
-    for index in np.flatnonzero(wrong):
-        row = np.round(pairs[index][0], 6).tolist()
-        yield f"u_i, p_A, p_B = {row} give {dict(zip(outputs, of_values[index], strict=True))}, expected {must[index]}"
-    if len(pairs) < PHYSICAL_ROWS // 2:
-        yield f"{len(pairs)} of {PHYSICAL_ROWS} inputs have codes that rounding does not decide; expected half of them"
+    known = [(row, codes) for row in rows.tolist() if (codes := _codes(compensator, row))]
+    yield from _law_faults(fmu, compensator, VALUES, [row for row, _ in known], [codes for _, codes in known])
+    if len(known) < PHYSICAL_ROWS // 2:
+        yield f"{len(known)} of {PHYSICAL_ROWS} inputs have codes that rounding does not decide; expected half of them"
 
 
-def _codes(compensator: Compensator, row: list[float]) -> tuple[int, int, int] | None:
+def _codes(compensator: Compensator, row: Row) -> Codes | None:
     """Return the codes that an ideal converter makes of V, MPa and MPa; None at a border.
 
     A span of n codes has n + 1 of them, of one width.
@@ -270,34 +228,32 @@ def _codes(compensator: Compensator, row: list[float]) -> tuple[int, int, int] |
     return command_code, p_a, p_b
 
 
-def closed_loop_check(fmu: Unpacked, plant_fmu: Unpacked, plant: Plant, compensator: Compensator) -> Check:
+def closed_loop_check(
+    fmu: Unpacked, plant_fmu: Unpacked, plant: Plant, compensator: Compensator, firmware: Path
+) -> Check:
     """Compare the flow of the coupled FMUs with that of `verify`'s own loop, at the least and largest tested drop."""
     signals, worst, periods = compensator.signals, 0.0, 0
     times, corners = np.arange(0, COURSE[-1][0], 1 / signals.tick_Hz), np.array(COURSE)
     share = np.interp(times, corners[:, 0], corners[:, 1])
     try:
-        with scratch_folder() as firmware:
-            # The core that the FMU carries as sources, where a closed loop finds it.
-            shutil.copytree(fmu.folder / "sources", firmware / "core")
-            for sign in signals.signs:
-                loop = ClosedLoop(plant, firmware, compensator, sign)
-                tests = compensator.valve.sides[SIDES[sign]].tests
-                drops = [test.dp_MPa for test in tests if test.dp_MPa is not None] or [1.0]
-                for drop_MPa in sorted({min(drops), max(drops)}):
-                    back_MPa = loop.back_within_span(BENCH_BACK_MPA, drop_MPa)
-                    run = loop.run(share, drop_MPa, "compensated", back_MPa=back_MPa, periods_per_record=1)
-                    swapped = sign < 0 and signals.swapped
-                    found = np.array(run_in_child(
-                        "coupled", f"{fmu.name} with {plant_fmu.name}", compensator=str(fmu.folder),
-                        plant=str(plant_fmu.folder), drop_MPa=drop_MPa, back_MPa=back_MPa, step_s=1 / signals.tick_Hz,
-                        command_V=(sign * share * float(compensator.u_max_V)).tolist(),
-                        drive="compare_b" if sign < 0 else "compare_a",
-                        pressures=("p_B", "p_A") if swapped else ("p_A", "p_B"),
-                    ))  # fmt: skip
-                    if (largest := float(run.q_L_min.max())) <= 0:
-                        raise RequirementError(f"the same plant lets no flow pass at {drop_MPa:g} MPa")
-                    worst = max(worst, float(np.abs(found[:, 0] - run.q_L_min).max()) / largest)
-                    periods += share.size
+        for sign in signals.signs:
+            loop = ClosedLoop(plant, firmware, compensator, sign)
+            tests = compensator.valve.sides[SIDE_NAMES[sign]].tests
+            drops = [test.dp_MPa for test in tests if test.dp_MPa is not None] or [1.0]
+            for drop_MPa in sorted({min(drops), max(drops)}):
+                back_MPa = loop.back_within_span(BENCH_BACK_MPA, drop_MPa)
+                run = loop.run(share, drop_MPa, "compensated", back_MPa=back_MPa, periods_per_record=1)
+                found = np.array(run_in_child(
+                    "coupled", f"{fmu.name} with {plant_fmu.name}", compensator=str(fmu.folder),
+                    plant=str(plant_fmu.folder), drop_MPa=drop_MPa, back_MPa=back_MPa, step_s=1 / signals.tick_Hz,
+                    command_V=(sign * share * float(compensator.u_max_V)).tolist(),
+                    drive="compare_b" if sign < 0 else "compare_a",
+                    pressures=("p_B", "p_A") if loop.channels.swapped else ("p_A", "p_B"),
+                ))  # fmt: skip
+                if (largest := float(run.q_L_min.max())) <= 0:
+                    raise RequirementError(f"the same plant lets no flow pass at {drop_MPa:g} MPa")
+                worst = max(worst, float(np.abs(found[:, 0] - run.q_L_min).max()) / largest)
+                periods += share.size
     except RequirementError as error:
         return requirements.FMU_CLOSED_LOOP.check(holds=False, text=str(error))
     words = f"{periods} PWM periods, flows differ by at most {worst:.2g} of the largest; {TOLERANCE:g} is allowed"

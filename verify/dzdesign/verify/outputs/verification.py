@@ -56,15 +56,14 @@ def _is_a(target: str) -> Callable[[Given], bool]:
     return lambda output: output.manifest.target == target and as_generated(output.again, output.same)
 
 
-OF_TEXTS = (
-    requirements.EXACT_LAW, requirements.FALLBACK, requirements.STATES, requirements.OVERFLOW,
-    requirements.ZERO_COMMAND,
+OF_TEXTS = (requirements.EXACT_LAW, requirements.FALLBACK, requirements.STATES, requirements.ZERO_COMMAND)
+OF_FMUS = (
+    requirements.FMU_LAW, requirements.FMU_DRIVE, requirements.FMU_UNITS, requirements.FMU_CLOSED_LOOP,
 )  # fmt: skip
-OF_FMUS = (requirements.FMU_DRIVE, requirements.FMU_UNITS, requirements.FMU_CLOSED_LOOP)
-OF_AMPLIFIERS = (requirements.READ_BACK, requirements.SAFE, requirements.DEAD_ZONES, requirements.LAW_DEAD_ZONES)
+OF_AMPLIFIERS = (requirements.READ_BACK, requirements.SAFE, requirements.DEAD_ZONES)
 #: Target, as the manifest names it, to what its checks are of, and the checks.
 KINDS = {
-    "iec61131": (OF_TEXTS, texts.block_checks),
+    "iec61131": ((*OF_TEXTS, requirements.OVERFLOW), texts.block_checks),
     "fmu": ((requirements.FMU_VALID, *requirements.OF_INPUTS, *OF_FMUS), fmu.checks),
     "matlab": ((*OF_TEXTS, *requirements.OF_INPUTS), texts.function_checks),
     "amplifier": (OF_AMPLIFIERS, amplifier.checks),

@@ -1,4 +1,7 @@
-"""The generated core as a black box: compiled by itself for a machine, and every input tried there."""
+"""The generated core as a black box: compiled by itself for a machine, and every input tried there.
+
+On this machine the check is a library around the core's object, on another one a program.
+"""
 
 import copy
 from collections.abc import Sequence
@@ -10,6 +13,7 @@ import numpy as np
 from dzdesign.core.artefact_files import sha256_of, sha256_of_octets
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.verify.evidence import InputCounts
+from dzdesign.verify.toolchain.compiled_library import CompiledLibrary, Function
 from dzdesign.verify.toolchain.machines import (
     BLOCK_HEADER,
     HOST,
@@ -17,23 +21,35 @@ from dzdesign.verify.toolchain.machines import (
     VALVE_HEADER,
     Machine,
     block_of,
-    stored,
+    bound_files,
 )
 
 #: Source of the law, and what the names of its functions end with, by the sign of command.
 SOURCE, ENDINGS = "dz_comp.c", {1: "", -1: "_negative"}
-#: In programs/, what binds a core in block form to a block.
-BOUND = "bound_block.c"
-#: The core's functions that a check calls, dz_comp() and so on.
-CALLED = ("comp", "status", "beta")
-#: The check in C, of programs/.
+#: What the check in C calls, and the core's functions of a side.
+CALLED = {"DZ_CORE": "dz_comp", "DZ_STATUS": "dz_status", "DZ_BETA": "dz_beta"}
+#: The check in C, of programs/; its functions.
 CHECK = ("every_input.c", "other_codes.c", "every_input.h", "march.h")
-
+EVERYTHING = Function("dz_check_everything", ("in", "out", "out", "out"))
+SAMPLE = Function("dz_check_sample", ("in", "out"))
+#: The layouts of programs/every_input.h.
+PARTS, TURNS = 8, 6
+SCALARS = (
+    "parts", "codes", "first_code", "code_step", "sound_from", "sound_to", "zero_place", "zero_code", "compare_limit",
+    "a_low", "a_high", "b_low", "b_high", "turn", "reverse", "lowest", "safe_law", "safe_at_zero", "rows", "pairs",
+    "places", "stride", "cube", "impatient", "laws_at", "rows_at", "directions_at", "slant_at", "pairs_at",
+    "places_at", "betas_at", "tested_to",
+)  # fmt: skip
+PLAN = np.dtype([("denominator", "<i8", PARTS), ("part_end", "<i4", PARTS), *((name, "<i4") for name in SCALARS)])
+PART = np.dtype([("remainder", "<i8"), ("carry", "<i8"), ("quotient", "<i4"), ("step", "<i4")])
+ROW = np.dtype([("offset", "<i4"), ("b_low", "<u2"), ("pairs", "<u2"), ("first", "<u2"), ("law", "<u2")])
+DIRECTION = np.dtype([("until", "<i4", TURNS), ("sign", "<i2", TURNS)])
+PAIR = np.dtype([("a", "<u2"), ("b", "<u2"), ("sound", "<u2")])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Findings(InputCounts):
-    """What a machine found: the counts of programs/every_input.h, in their order, and of which object."""
+    """What a machine found: `struct dz_findings`, and of which object."""
 
     #: Of the first wrong value.
     first_row: int
@@ -47,8 +63,9 @@ class Findings(InputCounts):
     object_sha256: str
 
 
-#: What a program prints of an input check behind the two words of the hash, in this order.
+#: What a program prints of an input check behind the two words of the hash, in this order; and `struct dz_findings`.
 COUNTED = [field.name for field in fields(Findings)][:15]
+FINDINGS = np.dtype([("hash", "<u8"), *((name, "<u4") for name in COUNTED), ("_", "<u4")])
 
 
 class CompiledCore:
@@ -78,39 +95,37 @@ class CompiledCore:
 
     def check(self, prepared: bytes, machine: Machine = HOST, *, sample: bool = False) -> Findings:
         """Try what was prepared on a machine; a core that does not compile, crashes or hangs: `RequirementError`."""
-        core = self.compiled(machine)
-        names = [f"dz_{name}{self._ending}" for name in CALLED]
-        objects, held = [core], self.block is not None and not machine.section
-        if self.block is not None:
-            objects.append(self._adapter(machine, names, held))
-            names = [f"dz_bound_{name}" for name in CALLED]
-        flags = (*machine.check_flags, *_defines(held, ("DZ_CORE", "DZ_STATUS", "DZ_BETA"), names))
-        check = {name: _read(PROGRAMS / name) for name in (*CHECK, machine.main)} | machine.headers
-        units = [name for name in check if name.endswith(".c")]
-        objects += [machine.compile(name, check, flags, "the check") for name in units]
-        arguments = []
-        if machine.section:
-            objects.append(embedded(machine, "prepared", machine.section, prepared))
-            if self.block is not None:
-                objects.append(embedded(machine, "block", machine.block_section, self.block))
+        core, what = self.compiled(machine), f"the core {self.name}"
+        flags = (*machine.check_flags, *(f"-D{name}={called}{self._ending}" for name, called in CALLED.items()))
+        headers = {name: self.sources[name] for name in ("dz_comp.h", BLOCK_HEADER)} | machine.headers
+        check = {name: _read(PROGRAMS / name) for name in (*CHECK, *filter(None, [machine.main]))}
+        bound = {name: text.encode() for name, text in bound_files(self.block).items()}
+        headers |= {name: text for name, text in (check | bound).items() if name.endswith(".h")}
+        units = {name: text for name, text in (check | bound).items() if name.endswith(".c")}
+        compiled = [machine.compile(name, {**headers, name: text}, flags, "the check") for name, text in units.items()]
+        objects = [core, *compiled]
+        if not machine.main:
+            counts, hashed, at_zero = _tried(objects, machine, prepared, what, sample=sample)
         else:
-            blocks = [str(stored(self.block))] if self.block is not None else []
-            arguments = [str(stored(prepared)), *(["sample"] if sample else []), *blocks]
-        program = machine.link(objects, f"the core {self.name} ({machine.name})")
-        printed = machine.run(program, arguments, f"the core {self.name}")
-        return findings_of(printed, sha256_of_octets(core.read_bytes()), f"the core {self.name} on the {machine.name}")
-
-    def _adapter(self, machine: Machine, names: Sequence[str], held: bool) -> Path:
-        """Return the object that binds the core's functions of a side to a block."""
-        sources = {**self.sources, BOUND: _read(PROGRAMS / BOUND)}
-        flags = (*machine.check_flags, *_defines(held, ("DZ_COMP", "DZ_STATUS", "DZ_BETA"), names))
-        return machine.compile(BOUND, sources, flags, "the adapter of the block")
+            objects.append(embedded(machine, "prepared", machine.section, prepared))
+            printed = machine.run(machine.link(objects, f"{what} ({machine.name})"), [], what)
+            counts, hashed = counts_in(printed, f"{what} on the {machine.name}")
+            at_zero = np.zeros(0, dtype=np.int64)
+        digest = sha256_of_octets(core.read_bytes())
+        return Findings(outputs_hash=f"{hashed:016x}", at_zero=at_zero, object_sha256=digest, **counts)
 
 
-def _defines(held: bool, macros: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
-    """Return the flags that name the functions to call; `held` is a block that comes from a file."""
-    called = (f"-D{macro}={name}" for macro, name in zip(macros, names, strict=True))
-    return (*called, *(["-DDZ_HELD"] if held else []))
+def _tried(
+    objects: Sequence[Path], machine: Machine, prepared: bytes, what: str, *, sample: bool
+) -> tuple[dict[str, int], int, np.ndarray]:
+    """Return counts, the hash and the values at zero command that the check finds on this machine."""
+    library = CompiledLibrary({}, [EVERYTHING, SAMPLE], what, machine.link_flags, objects)
+    plan, found = np.frombuffer(prepared, dtype=PLAN, count=1)[0], np.zeros(1, dtype=FINDINGS)
+    at_zero = np.zeros(0 if sample else int(plan["rows"]), dtype="<u2")
+    work = np.zeros(3 * int(plan["codes"]), dtype="<u2")
+    name, buffers = (SAMPLE.name, (found,)) if sample else (EVERYTHING.name, (work, at_zero, found))
+    library.call(name, prepared, *buffers, timeout_s=machine.run_timeout_s)
+    return {name: int(found[name][0]) for name in COUNTED}, int(found["hash"][0]), at_zero.astype(np.int64)
 
 
 def embedded(machine: Machine, name: str, section: str, content: bytes) -> Path:
@@ -127,15 +142,10 @@ def _read(path: Path) -> bytes:
         raise InputError(f"{path}: can't be read: {error.strerror}; make it again with `dzdesign codegen`") from error
 
 
-def findings_of(printed: list[list[int]], object_sha256: str, what: str) -> Findings:
-    """Return the findings that a program of the check printed; other numbers are a `RequirementError`."""
+def counts_in(printed: list[list[int]], what: str) -> tuple[dict[str, int], int]:
+    """Return the counts and the hash that a program of the check printed; other numbers are a `RequirementError`."""
     if not printed or len(printed[0]) != 2 + len(COUNTED):
         found = printed[0][:3] if printed else "nothing"
         raise RequirementError(f"{what} reported {found}, expected {2 + len(COUNTED)} numbers")
     high, low, *counts = printed[0]
-    return Findings(
-        outputs_hash=f"{high:08x}{low:08x}",
-        at_zero=np.array(printed[1] if len(printed) > 1 else [], dtype=np.int64),
-        object_sha256=object_sha256,
-        **dict(zip(COUNTED, counts, strict=True)),
-    )
+    return dict(zip(COUNTED, counts, strict=True)), high << 32 | low

@@ -19,15 +19,13 @@ import numpy as np
 from dzdesign.core.errors import RequirementError
 from dzdesign.core.processes.running import ended_with_this_process, start_watch
 from dzdesign.verify.toolchain.host_compiler import built, host_compiler, words_of
-from dzdesign.verify.toolchain.machines import reason_of
+from dzdesign.verify.toolchain.machines import HOST_FLAGS, reason_of
 
 SERVER = Path(__file__).with_name("library_server.py")
 #: A call that takes longer hangs, s.
 CALL_S = 60.0
 #: Kinds of buffers: the functions read them, write them from zeros on, or read and write them.
 BUFFERS = ("in", "out", "both")
-#: A library whose own calls are not looked up.
-LIBRARY_FLAGS = ("-shared", *(() if sys.platform == "win32" else ("-fPIC", "-fno-semantic-interposition")))
 #: On Windows a function is exported by a word to the linker, which GCC's, LLVM's and Microsoft's take from an object.
 EXPORTED = '__asm__(".section .drectve,\\"yn\\"\\n\\t.ascii \\" -export:{}\\"");\n'
 #: What a pipe is asked to hold where that can be said: the arrays of a run have megabytes.
@@ -48,7 +46,7 @@ class Function:
 
 
 class CompiledLibrary:
-    """C files, compiled with the headers among them; the child process starts with the first call.
+    """C files, compiled with the headers among them, and objects; the child process starts with the first call.
 
     It stays until this object goes, so that what the C keeps in static memory stays as well. A process that has ended
     is not started again: each further call is the same `RequirementError`. A library serves one call after another; for
@@ -56,15 +54,16 @@ class CompiledLibrary:
     """
 
     def __init__(
-        self, sources: Mapping[str, str], functions: Sequence[Function], what: str, options: Sequence[str] = ()
-    ) -> None:
+        self, sources: Mapping[str, str], functions: Sequence[Function], what: str, options: Sequence[str] = (),
+        objects: Sequence[Path] = (),
+    ) -> None:  # fmt: skip
         self._what, self._lock, self._failure = what, Lock(), ""
         self._functions = {each.name: each for each in functions}
         exports = "".join(map(EXPORTED.format, self._functions)) if sys.platform == "win32" else ""
         texts = {name: text.encode(errors="surrogateescape") for name, text in sources.items()}
         texts |= {"dz_exports.c": exports.encode()} if exports else {}
         units = [name for name in texts if name.endswith(".c")]
-        command = [*words_of(host_compiler()), "-std=c99", "-O2", *LIBRARY_FLAGS, *options, *units, "-lm"]
+        command = [*words_of(host_compiler()), "-shared", *HOST_FLAGS, *options, *units, *map(str, objects), "-lm"]
         self._library = built(f"library{'.dll' if sys.platform == 'win32' else '.so'}", command, texts, what)
         self._process: subprocess.Popen[bytes] | None = None
 

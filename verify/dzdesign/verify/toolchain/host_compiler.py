@@ -8,10 +8,8 @@ import logging
 import os
 import shlex
 import subprocess
-import tempfile
 import time
 from collections.abc import Mapping, Sequence
-from functools import cache
 from pathlib import Path
 from threading import Lock
 
@@ -31,11 +29,6 @@ TIMEOUT_S = 300
 #: name, so that equal sources gave unequal objects), to compile for every processor of the kind and not for this one,
 #: and to build no traps into what is undefined (it does so where it is not told to optimize).
 LIKE_OTHERS = ("-g0", "-mcpu=baseline", "-fno-sanitize=undefined")
-
-#: C that every compiler must refuse with `STRICT`; one that takes it was told to keep its warnings to itself.
-NARROWS = "short dz_narrows(int value);\nshort dz_narrows(int value) { return value; }\n"
-#: C that every compiler takes.
-TINY = "int main(void) { return 0; }\n"
 #: Variables by which gcc and clang take other headers or options than those of the command.
 REDIRECTING = ("CPATH", "C_INCLUDE_PATH", "CCC_OVERRIDE_OPTIONS")
 
@@ -121,27 +114,7 @@ def host_compiler() -> str:
             "`pip install ziglang` into this environment, `apt install gcc`, `xcode-select --install`, or on "
             "Windows `winget install LLVM.LLVM`; `dzdesign doctor` says what is there"
         )
-    if os.environ.get("CC"):
-        _check_that_it_compiles(compilers[0], os.environ.get("PATH", ""))
     return compilers[0]
-
-
-@cache
-def _check_that_it_compiles(compiler: str, path: str) -> None:
-    """Refuse a $CC that makes no program of C, for which firmware would be blamed; `path` may make it another one."""
-    with tempfile.TemporaryDirectory(dir=build_folder(), ignore_cleanup_errors=True) as folder:
-        place = Path(folder)
-        (place / "tiny.c").write_text(TINY, encoding="utf-8")
-        try:
-            build([*words_of(compiler), "tiny.c", "-o", "tiny.exe"], "a tiny program", place)
-            reason = "" if (place / "tiny.exe").is_file() else "it ended well and wrote nothing"
-        except RequirementError as error:
-            reason = str(error)
-    if reason:
-        raise InputError(
-            f"$CC is {compiler!r}, which makes no program of C ({reason}); set it to a C compiler, without options by "
-            "which it does not compile or link, or unset it"
-        )
 
 
 def run_compiler(command: Sequence[str], folder: Path | None = None) -> subprocess.CompletedProcess[str]:
@@ -167,17 +140,6 @@ def build(command: Sequence[str], what: str, folder: Path | None = None) -> None
         raise RequirementError(f"{what} could not be compiled: {error}") from error
     if done.returncode:
         raise RequirementError(f"{what} does not compile: {first_error(done.stderr)}")
-
-
-def keeps_warnings(compiler: str) -> bool:
-    """Tell whether a compiler takes without a word what it must refuse: then its word on other C means nothing."""
-    source = build_folder() / "narrows.c"
-    source.write_text(NARROWS, encoding="utf-8")
-    try:
-        check_strictly(source, compiler)
-    except RequirementError:
-        return False
-    return True
 
 
 def name_of(compiler: str) -> str:

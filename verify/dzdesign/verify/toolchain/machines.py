@@ -19,12 +19,11 @@ from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
 
-from dzdesign.core.artefact_files import sha256_of_octets
 from dzdesign.core.errors import RequirementError
 from dzdesign.core.processes.programs import find_program
 from dzdesign.core.processes.running import run_program
 from dzdesign.design.firmware_manifest import BLOCK_FILE
-from dzdesign.verify.toolchain.host_compiler import alone, build_folder, built, host_compiler, words_of
+from dzdesign.verify.toolchain.host_compiler import built, host_compiler, words_of
 
 #: Largest number that a program of ours prints has 32 bits; what has more digits is none of ours.
 NUMBERS = re.compile(r"\s*\d{1,10}(?:\s+\d{1,10})*\s*", re.ASCII)
@@ -87,8 +86,8 @@ logger = logging.getLogger(__name__)
 
 #: Folder of the checks' C.
 PROGRAMS = Path(str(files("dzdesign.verify.toolchain"))) / "programs"
-#: Of the core where its target's makefile says nothing else.
-HOST_FLAGS = ("-std=c99", "-O2")
+#: On this machine, of what becomes part of a library whose own calls are not looked up.
+HOST_FLAGS = ("-std=c99", "-O2", *(() if sys.platform == "win32" else ("-fPIC", "-fno-semantic-interposition")))
 #: With which simavr marks what the UART sends.
 ESCAPES = re.compile(r"\x1b\[[0-9]*m")
 
@@ -103,16 +102,14 @@ class Machine:
     #: Those of the target's makefile, and those for the check around the core.
     core_flags: tuple[str, ...]
     check_flags: tuple[str, ...]
-    #: The program's file in programs/.
-    main: str
-    #: File there with how a program starts, puts numbers and ends, for what includes machine.h.
+    #: File in programs/ with how a program starts, puts numbers and ends, for what includes machine.h.
     start_up: str
+    #: The program around the check of every input there; empty: it is a library.
+    main: str = ""
     #: ``{programs}`` is the folder of that name.
     link_flags: tuple[str, ...] = ()
-    #: Of the prepared inputs in the program; empty: they are a file that it reads.
+    #: Of the prepared inputs in the program.
     section: str = ""
-    #: The same of a calibration block, which the core reads as any data.
-    block_section: str = ""
     #: What runs the program: its path is added.
     runner: tuple[str, ...] = ()
     #: Program to the Debian package that has it.
@@ -161,25 +158,8 @@ class Machine:
         return numbers_in(ESCAPES.sub("", ended.printed + "\n" + ended.complaint).replace(" .", " "))
 
 
-def stored(content: bytes) -> Path:
-    """Return a file of that content, written once."""
-    file = build_folder() / f"{sha256_of_octets(content)[:32]}.bin"
-    with alone(file):
-        if not file.exists():
-            file.write_bytes(content)
-    return file
-
-
-def discard(*contents: bytes) -> None:
-    """Remove files of such contents: what one valve of a lot needs, no other does."""
-    for content in contents:
-        file = build_folder() / f"{sha256_of_octets(content)[:32]}.bin"
-        with alone(file):
-            file.unlink(missing_ok=True)
-
-
 HOST = Machine(
-    name="host", core_flags=HOST_FLAGS, check_flags=("-std=c99", "-O3"), main="host.c", start_up="start_host.h"
+    name="host", core_flags=HOST_FLAGS, check_flags=(*HOST_FLAGS, "-O3"), start_up="start_host.h"
 )
 _M4 = ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=soft")
 CORTEX_M4 = Machine(
@@ -191,7 +171,6 @@ CORTEX_M4 = Machine(
     start_up="start_cortex_m4.h",
     link_flags=(*_M4, "-nostartfiles", "-nostdlib", "-T", "{programs}/cortex_m4.ld", "-Wl,--gc-sections", "-lgcc"),
     section='.section .rodata, "a", %progbits',
-    block_section='.section .rodata, "a", %progbits',
     runner=(
         "qemu-system-arm", "-M", "mps2-an386", "-cpu", "cortex-m4", "-nographic", "-monitor", "none", "-serial", "none",
         "-semihosting-config", "enable=on,target=native", "-kernel",
@@ -211,8 +190,6 @@ AVR = Machine(
     start_up="start_avr.h",
     link_flags=(*_AVR, "-Wl,--gc-sections"),
     section='.section .progmem.data, "a", @progbits',
-    # With what copies it from flash to RAM at the start, which the compiler asks for and the assembler does not.
-    block_section='.global __do_copy_data\n.section .data, "aw", @progbits',
     runner=("simavr", "-m", CHIP, "-f", str(CLOCK_HZ)),
     needs={"avr-gcc": "gcc-avr avr-libc", "simavr": "simavr"},
     small=True,
@@ -244,25 +221,27 @@ def block_of(folder: Path) -> bytes | None:
         ) from error
 
 
-def bound_files(folder: Path) -> dict[str, str]:
+def bound_files(block: bytes | None) -> dict[str, str]:
     """Return what a program is compiled with beside a core in block form; nothing for a core with its valve's numbers.
 
     That is a header for the program, which calls the core's functions as those of the fixed form, and the block as C.
     """
-    block = block_of(folder)
     if block is None:
         return {}
     words = [int.from_bytes(block[at : at + 2], "little") for at in range(0, len(block), 2)]
     lines = [words[at : at + WORDS_A_LINE] for at in range(0, len(words), WORDS_A_LINE)]
     numbers = "\n".join("    " + " ".join(f"{word}u," for word in line) for line in lines)
-    includes = f'#include "{BLOCK_HEADER}"\n\n#include "{BOUND_HEADER}"\n\n'
+    head = (
+        f'#include "{BLOCK_HEADER}"\n\n#include "{BOUND_HEADER}"\n\n#if DZ_CALIBRATION_WORDS != {len(words)}\n'
+        f"#error no such calibration block: {len(block)} octets\n#endif\n"
+    )
     return {
         BOUND_HEADER: (PROGRAMS / BOUND_HEADER).read_text(encoding="utf-8"),
-        BOUND_SOURCE: f"{includes}const union dz_bound dz_bound = {{{{\n{numbers}\n}}}};\n",
+        BOUND_SOURCE: f"{head}const union dz_bound dz_bound = {{{{\n{numbers}\n}}}};\n",
     }
 
 
 def core_sources(folder: Path) -> dict[str, str]:
     """Return the C code of a firmware's core, and what binds one in block form to its block."""
     core = {path.name: path.read_text(encoding="utf-8") for path in sorted((folder / "core").glob("*.[ch]"))}
-    return {**core, **bound_files(folder)}
+    return {**core, **bound_files(block_of(folder))}

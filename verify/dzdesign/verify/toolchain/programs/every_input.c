@@ -6,7 +6,11 @@
 #include "every_input.h"
 #include "march.h"
 
-uint16_t DZ_CORE(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
+#include "dz_comp.h"
+
+#ifdef DZ_CALIBRATION_WORDS
+#include "bound.h"
+#endif
 
 /* By itself, so that the linker can lay it beside the core: an emulator's jumps are quick within a page. */
 #define NEAR __attribute__((noinline))

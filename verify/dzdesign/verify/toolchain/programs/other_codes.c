@@ -2,9 +2,11 @@
 #include "every_input.h"
 #include "march.h"
 
-uint16_t DZ_CORE(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
-uint16_t DZ_STATUS(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
-uint16_t DZ_BETA(uint16_t p_a_adc, uint16_t p_b_adc);
+#include "dz_comp.h"
+
+#ifdef DZ_CALIBRATION_WORDS
+#include "bound.h"
+#endif
 
 /* Every `stride`-th code of 16 bits as command, at each pair of pressures: without a sound command nothing is driven,
  * without sound pressures the law's safe end. */

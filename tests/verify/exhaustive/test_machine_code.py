@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from dzdesign.verify.analysis import machine_code
+from dzdesign.verify.exhaustive import machine_code
 from dzdesign.verify.toolchain.machines import Machine
 
 

@@ -3,7 +3,7 @@
 A constant is changed by one, or, beyond 16 bits, by one in the last of its 16 leading bits: the finest that a compare
 value of 16 bits resolves. Below that lie the bits of a scaled product that its one rounding takes away.
 
-Whether verify would see a wrong firmware: every constant, comparison and operator of its core changed by itself.
+Whether `verify` would see a wrong firmware: every constant, comparison and operator of its core changed by itself.
 
 A mutant is killed if the check of all inputs (values, fallbacks, status, beta) or that of the drive finds a fault, or
 if the program crashes or hangs. One that a compiler refuses is no evidence, and counted apart. What is left is
@@ -15,23 +15,19 @@ what the original's return. Otherwise it survives.
 
 import os
 import re
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
 
 from dzdesign.core.errors import RequirementError
-from dzdesign.verify.evidence import MutantOutcome, MutationScore
 from dzdesign.verify.exhaustive.drive_check import CompiledDrive, DriveCheck, PreparedDrive
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import PreparedInputs
 from dzdesign.verify.folder import read_compensator
-from dzdesign.verify.requirements import MUTATION, Check
 from dzdesign.verify.toolchain.compiled_core import CompiledCore, Findings
-from dzdesign.verify.toolchain.machines import HOST, PROGRAMS
+from dzdesign.verify.toolchain.machines import HOST
 
 #: Comments, rows that fill a table beyond what is used, directives that hold no value, and what a mutation may meet;
 #: the first that matches is taken.
@@ -95,6 +91,17 @@ def _instead(token: re.Match[str], before: str) -> list[str]:
     if operator in SWAPS and between:
         return [SWAPS[operator]]
     return [""] if operator in DROPPED and not between else []
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MutantOutcome:
+    """Result of one mutant, and the check that caught it; empty if none did."""
+
+    file: str
+    line: int
+    change: str
+    verdict: str
+    killer: str = ""
 
 
 KILLED, REFUSED, SAME_OBJECT, SAME_OUTPUTS, SURVIVED = (
@@ -170,7 +177,7 @@ class MutationBench:
         """Compare every function of the core with the original's at random triples of 16 bits."""
         results = []
         flags = (*HOST.check_flags, *(["-DDZ_BOTH"] if len(self._signs) > 1 else []))
-        source = {"random_triples.c": (PROGRAMS / "random_triples.c").read_bytes()}
+        source = {"random_triples.c": Path(__file__).with_name("random_triples.c").read_bytes()}
         main = HOST.compile("random_triples.c", source, flags, "the random triples")
         for each in (objects, self._drive.objects()):
             program = HOST.link([*each, main], "the random triples")
@@ -183,41 +190,7 @@ def all_mutants(bench: MutationBench) -> list[Mutant]:
     return [mutant for name, text in bench.sources.items() for mutant in mutants_of(name, text)]
 
 
-def judge_all(
-    bench: MutationBench, mutants: Sequence[Mutant], bar: Callable[[Sequence[Any]], Iterable[Any]] = iter
-) -> list[MutantOutcome]:
-    """Judge mutants on all processors; `bar` shows progress over a sequence, and hands its items on."""
+def judge_all(bench: MutationBench, mutants: Sequence[Mutant]) -> list[MutantOutcome]:
+    """Judge mutants on all processors."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        futures = [pool.submit(bench.judge, mutant) for mutant in mutants]
-        try:
-            return [future.result() for future in bar(futures)]
-        except BaseException:
-            pool.shutdown(cancel_futures=True)
-            raise
-
-
-def mutation_score(outcomes: Sequence[MutantOutcome]) -> MutationScore:
-    """Return the counts, and by name what was not killed and why."""
-    count = Counter(each.verdict for each in outcomes)
-    return MutationScore(
-        mutants=len(outcomes),
-        killed=count[KILLED],
-        refused=count[REFUSED],
-        same_object=count[SAME_OBJECT],
-        same_outputs=count[SAME_OUTPUTS],
-        survived=count[SURVIVED],
-        killers=dict(Counter(each.killer for each in outcomes if each.killer)),
-        equivalent_means=f"the object is the same; or the compare values at all inputs, the status words and betas "
-        f"are the law's, the drive follows its model, and {RANDOM_TRIPLES} random triples of codes give the same",
-        not_killed=tuple(each for each in outcomes if each.verdict != KILLED),
-    )
-
-
-def mutation_check(score: MutationScore) -> Check:
-    """Return the requirement that no mutant survives that is not equivalent."""
-    return MUTATION.check(
-        holds=score.survived == 0 and score.killed > 0,
-        text=f"{score.killed} of {score.mutants} mutants killed, {score.same_object + score.same_outputs} equivalent "
-        f"({score.same_object} of the same object code, {score.same_outputs} of the same outputs), "
-        f"{score.refused} refused by the compiler, {score.survived} survived",
-    )
+        return list(pool.map(bench.judge, mutants))

@@ -8,7 +8,7 @@ from pathlib import Path
 from dzdesign.core.errors import RequirementError
 from dzdesign.core.processes.running import run_program
 from dzdesign.verify.toolchain.compiled_core import embedded
-from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4, PROGRAMS, Machine, block_of
+from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4, Machine, block_of
 
 PROGRAM = "core_cost.c"
 #: Sources of law and drive, and of the check of a block.
@@ -16,11 +16,15 @@ FILES = ("dz_comp.[ch]", "dz_drive.[ch]", "dz_calibration.[ch]", "dz_valve.h")
 CHECK = "dz_calibration.c"
 #: What is called, in the order of the program's numbers.
 CALLS = ("dz_comp", "dz_drive_sample", "dz_drive_tick")
-#: What a machine's program counts.
-UNITS = {CORTEX_M4.name: "instructions", AVR.name: "cycles"}
 #: Sections of an object that stay in flash; on the AVR data and constants are copied to RAM as well.
 IN_FLASH = re.compile(r"\.(?:text|rodata|data)\b")
 IN_RAM = {CORTEX_M4.name: re.compile(r"\.(?:data|bss)\b"), AVR.name: re.compile(r"\.(?:rodata|data|bss)\b")}
+#: Where a block lies that the program writes to; on the AVR with what copies it from flash to RAM at the start, which
+#: the compiler asks for and the assembler does not.
+BLOCK_SECTION = {
+    CORTEX_M4.name: '.section .rodata, "a", %progbits',
+    AVR.name: '.global __do_copy_data\n.section .data, "aw", @progbits',
+}
 VERSION = re.compile(r"\b\d+\.\d+\.\d+\b")
 
 
@@ -37,15 +41,6 @@ class BlockCost:
     #: Of each of `CALLS` the most that was counted with this block, then with every drive function on, then with the
     #: longest shifts of its divisions too, as far as the firmware's check takes such a block.
     hardest: tuple[int, int, int]
-
-    def words(self, unit: str) -> str:
-        """The figures as a sentence has them."""
-        hardest = ", ".join(f"{name} {most}" for name, most in zip(CALLS, self.hardest, strict=True))
-        return (
-            f"the check of a block takes {self.check_flash_bytes} bytes of flash, {self.check_ram_bytes} of RAM, "
-            f"{self.check_stack_bytes} of stack and {self.check_count} {unit}, the block {self.block_bytes} bytes; "
-            f"most {unit} counted with this block and with the drive functions on that it leaves off: {hardest}"
-        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,21 +61,6 @@ class CoreCost:
     counts: tuple[tuple[int, int], ...]
     #: Of a core in block form; the counts are those with the firmware's own block.
     block: BlockCost | None = None
-
-    @property
-    def words(self) -> str:
-        """The figures as a sentence has them."""
-        calls = (
-            f"{name} {least if least == most else f'{least} to {most}'}"
-            for name, (least, most) in zip(CALLS, self.counts, strict=True)
-        )
-        unit = UNITS[self.machine]
-        text = (
-            f"law and drive take {self.flash_bytes} bytes of flash, {self.ram_bytes} of RAM and {self.valve_bytes} a "
-            f"valve, {self.stack_bytes} of stack; {unit} a call{' with this block' if self.block else ''}: "
-            f"{', '.join(calls)} ({self.compiler})"
-        )
-        return f"{text}; {self.block.words(unit)}" if self.block else text
 
 
 def core_cost(folder: Path, machine: Machine) -> CoreCost:
@@ -125,11 +105,11 @@ def _counted(machine: Machine, core: dict[str, bytes], objects: dict[str, Path],
     """Return the numbers that the measuring program prints."""
     what = "the measuring program"
     both = any(b"dz_comp_negative" in text for text in core.values())
-    sources = core | {PROGRAM: (PROGRAMS / PROGRAM).read_bytes()} | machine.headers
+    sources = core | {PROGRAM: Path(__file__).with_name(PROGRAM).read_bytes()} | machine.headers
     flags = (*machine.check_flags, f"-DBOTH={int(both)}", *(["-DDZ_BLOCK"] if block else []))
     linked = [*objects.values(), machine.compile(PROGRAM, sources, flags, what)]
     if block is not None:
-        linked.append(embedded(machine, "block", machine.block_section, block))
+        linked.append(embedded(machine, "block", BLOCK_SECTION[machine.name], block))
     printed = _counting(machine).run(machine.link(linked, what), [], what)
     expected = 10 if block is None else 22
     if len(printed) != 1 or len(printed[0]) != expected:

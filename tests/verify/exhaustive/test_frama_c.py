@@ -5,10 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from dzdesign.command_line.cli import main
-from dzdesign.verify.analysis import machine_code as proof
-from dzdesign.verify.analysis.machine_code import proof_check, prove
+from dzdesign.core.errors import RequirementError
 from tests.support.core_variants import firmware
+from tests.support.frama_c import prove
 
 needs_frama_c = pytest.mark.skipif(not shutil.which("frama-c"), reason="needs Frama-C: apt install frama-c-base")
 
@@ -56,19 +55,9 @@ def test_a_fault_is_seen(file, right, wrong, function, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("each_core_once")
-def test_without_frama_c_the_requirement_is_not_checked(firmware_folder, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(proof, "PROGRAM", "no-such-program")
-    found = proof_check(firmware_folder)
-    assert found.holds is None and "apt install frama-c-base" in found.text
-    assert main(["verify", str(firmware_folder), "--proof", "-o", str(tmp_path / "evidence")]) == 1
-    assert "NOT CHECKED" in capsys.readouterr().out
-
-
-@pytest.mark.slow
 @needs_frama_c
-def test_c_that_frama_c_refuses_is_not_checked(tmp_path):
+def test_c_that_frama_c_refuses_is_not_without_alarms(tmp_path):
     folder = written(tmp_path, "default")
     (folder / "core" / "dz_comp.c").write_text("this is no C")
-    found = proof_check(folder)
-    assert found.holds is None and "frama-c" in found.text
+    with pytest.raises(RequirementError, match="frama-c"):
+        prove(folder)

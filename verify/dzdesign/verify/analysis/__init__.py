@@ -1,1 +1,0 @@
-"""Analysis: Frama-C, mutants, other machine code, state kept between calls."""
