@@ -178,7 +178,6 @@ def generate(
         board=tuple(sorted(target.board | (board_of_blocks(target) if block else frozenset()))),
         origin=origin_of(compensator, digest),
         vectors=vectors,
-        constants=tuple(constant for path in sorted(core) for constant in core[path].constants),
         files={path: sha256_of(text.encode()) for path, text in files.items()}
         | ({BLOCK_FILE: sha256_of(octets)} if octets else {}),
     )

@@ -25,7 +25,7 @@ from dzdesign.codegen.calibration.layout import (
     Words,
     entries,
 )
-from dzdesign.codegen.calibration.numbers import ValvePage, valve_keys
+from dzdesign.codegen.calibration.numbers import ValvePage
 from dzdesign.codegen.calibration.packing import pack, unpack
 from dzdesign.codegen.core.certificate_text import (
     KAPPA_ROUNDING,
@@ -157,7 +157,6 @@ def _core_file(name: str, values: Values, constants: Sequence[Define]) -> CoreFi
         template=f"{name}.jinja",
         values={**values, "misra_lines": misra_lines(name, fixed=bool(values["fixed"])),
                 "constants": defines(constants)},
-        constants=tuple(each.entry(f"core/{name}") for each in constants),
     )  # fmt: skip
 
 
@@ -165,7 +164,6 @@ def _valve_header(page: ValvePage) -> CoreFile:
     """Return dz_valve.h: the numbers, and what they are certified for."""
     c = page.compensator
     chosen, units = law(c.law), c.valve.recorded_units.of_controller
-    keys, name = valve_keys(c), f"core/{VALVE_HEADER}"
     values: Values = {
         **_form(page.built),
         "misra_lines": misra_lines(VALVE_HEADER, fixed=True),
@@ -185,8 +183,7 @@ def _valve_header(page: ValvePage) -> CoreFile:
         ],
         "lines": page.lines(),
     }
-    constants = tuple(number.constant(name, keys) for number in page.numbers())
-    return CoreFile(template=f"{VALVE_HEADER}.jinja", values=values, constants=constants)
+    return CoreFile(template=f"{VALVE_HEADER}.jinja", values=values)
 
 
 def _rational(value: Fraction) -> str:
@@ -231,7 +228,7 @@ def _constants(built: BuiltFor, numbers: CalibrationBlock | None) -> dict[str, l
                engineering=f"{built.tick_Hz} periods and {built.sample_Hz} samples a second"),
         *([] if numbers is None else [
             Define(symbol="DZ_DRIVE_COMMAND_ZERO", value=numbers.command_zero, equation="code of zero command",
-                   engineering="command_zero of dz_valve.h", data=("signals.command.zero_code",))
+                   engineering="command_zero of dz_valve.h")
         ]),
         *drive_status_constants(block=not built.fixed),
     ]  # fmt: skip
@@ -240,8 +237,7 @@ def _constants(built: BuiltFor, numbers: CalibrationBlock | None) -> dict[str, l
         found["dz_current.h"] = current_fault_bits()
     if built.has("CURRENT") and numbers is not None:
         offset = Define(symbol="DZ_CURRENT_OFFSET_TICKS", value=1 << numbers.current.offset_shift,
-                        equation="sums that the offset is the mean of", engineering="with the output off",
-                        data=("current_drive.loop.offset_shift",))  # fmt: skip
+                        equation="sums that the offset is the mean of", engineering="with the output off")  # fmt: skip
         found["dz_current.h"].insert(0, offset)
     if built.has("SUPPLY"):
         found["dz_current.c"] += [

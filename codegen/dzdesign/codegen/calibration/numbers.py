@@ -1,8 +1,8 @@
 """The numbers of a valve as a C initialiser, the page that an engineer reads: of each what it is, its value in
-engineering units, how it was rounded, and where it comes from. The manifest lists the same.
+engineering units, how it was rounded, and where it comes from.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from textwrap import wrap
@@ -16,7 +16,6 @@ from dzdesign.derivation.law import law
 from dzdesign.derivation.presentation.formulas import to_text
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.drive_functions import RAMP_UNIT
-from dzdesign.design.firmware_manifest import FirmwareConstant
 from dzdesign.design.signals import SIDE_NAMES
 
 SIGNS = (1, -1)
@@ -49,26 +48,6 @@ class Number:
         origin = f" From {self.key}." if self.key else ""
         text = f"{self.entry.text}{unit}{value} ({self.entry.rounding}).{origin}"
         return c_comment((text[0].upper() + text[1:]).replace("²", "^2"), COLUMNS - indent)
-
-    def constant(self, file: str, valve_keys: Mapping[str, tuple[str, ...]]) -> FirmwareConstant:
-        """Return the manifest's entry; an array is a table, of pairs or of single numbers."""
-        value: int | tuple[tuple[int, int], ...]
-        if isinstance(self.value, int):
-            value = self.value
-        elif self.entry.pairs:
-            value = tuple(zip(self.value[::2], self.value[1::2], strict=True))
-        else:
-            value = tuple((number, 0) for number in self.value)
-        return FirmwareConstant(
-            file=file,
-            symbol=self.path,
-            value=value,
-            equation=self.entry.text,
-            engineering=self.engineering or "as it is",
-            rounding=self.entry.rounding,
-            compensator_json=(self.key,) if self.key else (),
-            valve_json=valve_keys.get(self.key, ()),
-        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -272,21 +251,3 @@ class ValvePage:
 
     def _share(self, codes: int, sign: int = 1) -> str:
         return share_of_command(self.compensator, codes, sign)
-
-
-def valve_keys(compensator: Compensator) -> dict[str, tuple[str, ...]]:
-    """Return which keys of valve.json `design` read for each key of compensator.json; all else are its options."""
-    found: dict[str, tuple[str, ...]] = {"u_max_V": ("u_max_V",)}
-    for sign in compensator.signals.signs:
-        side = f"sides.{SIDE_NAMES[sign]}"
-        curve = f"{side}.certified.{compensator.side(sign).certificate.guard}"
-        offset, bounds = f"{curve}.u_min0_V", (f"{curve}.offset_V", f"{curve}.u_lower_V", f"{curve}.curvature_V_MPa2")
-        # With a transition the law's offset is that of the opening threshold.
-        opening = (f"{side}.opening_curve",) if compensator.transition_codes else ()
-        found |= {
-            f"{side}.u_min0_over_u_max": opening or (offset,),
-            f"{side}.drive_range_over_u_max": (f"{side}.k_x_max_over_u_max", f"{side}.tests", *(opening or (offset,))),
-            f"{side}.certificate.dp_MPa": (f"{curve}.dp_MPa",),
-            f"{side}.beta": (offset, *bounds, f"{side}.trend", *opening),
-        }
-    return found

@@ -1,4 +1,4 @@
-"""A `#define` of the generated C, and where it is from; C's comment and the manifest's entry print it.
+"""A `#define` of the generated C, with what its comment says of it.
 
 Those of the status words of law, drive and current controller are here: a bit for each fault, by a convention and from
 no datum. So is what the core's banners say of MISRA C:2012: hardware files of the targets are outside of it, as
@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from textwrap import wrap
 
 from dzdesign.core.errors import DzdesignError
-from dzdesign.design.firmware_manifest import FirmwareConstant
 
 #: What a template prints: texts, and objects of `design` and of this room whose fields it prints.
 Values = Mapping[str, object]
@@ -23,15 +22,13 @@ EXACT = "exact"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Define:
-    """One `#define`: its fields are those of `FirmwareConstant`; `literal` is one of `LITERALS`."""
+    """One `#define`: what the number is, in engineering units, and how it was rounded; `literal` is of `LITERALS`."""
 
     symbol: str
     value: int
     equation: str
     engineering: str
     rounding: str = EXACT
-    #: Keys of compensator.json that it was computed from, dotted; none for what codegen chooses itself.
-    data: tuple[str, ...] = ()
     literal: str = "plain"
 
     def __post_init__(self) -> None:
@@ -47,21 +44,12 @@ class Define:
         """Return the comment and the `#define`."""
         return [*self.comment(), f"#define {self.symbol} {LITERALS[self.literal].format(self.value)}"]
 
-    def entry(self, file: str) -> FirmwareConstant:
-        """Return the manifest's entry of the constant in a file of the firmware."""
-        return FirmwareConstant(
-            file=file, symbol=self.symbol, value=self.value, equation=self.equation, engineering=self.engineering,
-            rounding=self.rounding, compensator_json=self.data, valve_json=(),
-        )  # fmt: skip
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CoreFile:
-    """One file of the core: its template, what this prints, and the constants among it, for the manifest."""
+    """One file of the core: its template, and what this prints."""
 
     template: str
     values: Values
-    constants: tuple[FirmwareConstant, ...] = ()
 
 
 def c_comment(text: str, columns: int = COLUMNS) -> list[str]:
