@@ -56,9 +56,8 @@ OTHER_TARGETS: Mapping[str, OtherTarget] = {
         ),
         OtherTarget(
             name="fmu",
-            description="FMUs for simulation tools, FMI 2.0: the compensator and, with --plant, the plant",
+            description="an FMU of the compensator for simulation tools, FMI 2.0",
             module="dzdesign.codegen.fmu.files",
-            options={"plant": ()},
         ),
         OtherTarget(
             name="matlab",
