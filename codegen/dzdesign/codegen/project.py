@@ -1,11 +1,10 @@
 """`generate`: a `Compensator` and a target in, the files of a C project out."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from importlib.resources import files as files_of
-from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING
 
@@ -24,12 +23,11 @@ from dzdesign.codegen.calibration.packing import OCTETS, pack
 from dzdesign.codegen.core.certificate_text import zero_command
 from dzdesign.codegen.core.constants import FAULT_BITS, CoreFile, Values
 from dzdesign.codegen.core_costs import MEASURED, STAND_IN
-from dzdesign.codegen.earlier_firmware import refuse_another_design, target_in
 from dzdesign.codegen.loading.protocol import LOAD_FILES, STORE, load_texts
 from dzdesign.codegen.target import Target, folder_of
 from dzdesign.codegen.vectors import vectors_text
 from dzdesign.codegen.wiring import wiring_of
-from dzdesign.core.artefact_files import sha256_of, write_folder
+from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.result_display import ShownInNotebooks
@@ -76,33 +74,6 @@ class Firmware(ShownInNotebooks):
     def contents(self) -> Mapping[str, str | bytes]:
         """Content of each file to write, by path, calibration block included."""
         return {**self.files, **({BLOCK_FILE: self.block} if self.block else {})}
-
-
-def write_firmware(firmware: Firmware, folder: Path, *, over_another: bool = False) -> Firmware:
-    """Write a firmware folder; board files that their user changed in an earlier one stay as they are.
-
-    The result is the same firmware, with a note on what was kept, and on a target that was replaced. A place that can't
-    be written, or holds files that would be lost, is an `InputError`; so is one with the firmware of another design,
-    unless it is to be written over.
-    """
-
-    def check() -> None:
-        if not over_another:
-            refuse_another_design(Path(folder), firmware.compensator)
-
-    check()  # of two at once, the other one may have written since
-    earlier = target_in(Path(folder))
-    kept = write_folder(folder, firmware.contents, firmware.manifest, check)
-    notes = [firmware.note] if firmware.note else []
-    if earlier not in ("", firmware.manifest.target):
-        gone = f"the firmware for {earlier} in '{folder}' was replaced by this one for {firmware.manifest.target}"
-        notes.append(f"{gone}; to have both, give each its own folder with -o")
-    if kept:
-        note = f"kept as you changed it: {', '.join(kept)}"
-        if newer := [name for name, other in kept.items() if other]:
-            note += f"; would be generated otherwise now: {', '.join(newer)}"
-        notes.append(f"{note}; for what is generated now, move yours away or choose a new folder with -o")
-    return replace(firmware, note="; ".join(notes))
 
 
 def target_named(name: str) -> Target:
