@@ -22,14 +22,13 @@ from dzdesign.codegen.calibration.layout import BuiltFor, CalibrationBlock
 from dzdesign.codegen.calibration.packing import OCTETS, pack
 from dzdesign.codegen.core.certificate_text import zero_command
 from dzdesign.codegen.core.constants import FAULT_BITS, CoreFile, Values
-from dzdesign.codegen.core_costs import MEASURED, STAND_IN
 from dzdesign.codegen.loading.protocol import LOAD_FILES, STORE, load_texts
 from dzdesign.codegen.target import Target, folder_of
 from dzdesign.codegen.vectors import vectors_text
 from dzdesign.codegen.wiring import wiring_of
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
-from dzdesign.core.errors import InputError, nearest
+from dzdesign.core.errors import DzdesignError, InputError, nearest
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.core.strict_templates import strict_templates
 from dzdesign.design.certificate import reach_of_certificate
@@ -185,7 +184,6 @@ def target_files(
     if target.takes_any_signals and compensator.target:  # a target without a converter of its own takes any
         full_V = compensator.target.converter.full_V
     values = {
-        **target.context,
         "bipolar": len(signals.signs) == 2,
         "signals": signals,
         "units": compensator.valve.recorded_units.of_controller,
@@ -204,11 +202,13 @@ def target_files(
         "wiring": wiring_of(compensator, Converter(full_V=full_V, levels=levels)),
         "firmware_origin": f"0x{banner.digest[:4].upper()}",
         "lot_setting": banner.lot,
-        "core_cost": MEASURED.get(target.name, MEASURED[STAND_IN]),
         "block_octets": OCTETS,
-        "cost_is_of_another": target.name not in MEASURED,
+        "on_cortex_m4": target.name == "cortex-m4",
         "certificate_reach": fill(reach_of_certificate(compensator), README_COLUMNS),
     }
+    if taken := sorted(values.keys() & target.context.keys()):
+        raise DzdesignError(f"target {target.name}: context names {taken} belong to the renderer")
+    values |= target.context
     in_block_form = {**block_templates(target, block), **(target.block_templates if block else {})}
     files = {
         path: _render(

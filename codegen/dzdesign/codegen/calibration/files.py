@@ -49,7 +49,6 @@ from dzdesign.codegen.core.constants import (
 )
 from dzdesign.codegen.core.integer_form import INT32_MAX
 from dzdesign.codegen.target import Target
-from dzdesign.core.strict_templates import strict_templates
 from dzdesign.derivation.law import law
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.current.circuit import CORRECTION_SHIFT
@@ -273,13 +272,6 @@ def _sides(built: BuiltFor) -> list[Values]:
     positive = {"s": "", "text": "positive", "from_band": forward, "turn": "", "pad": ""}
     negative = {"s": "_negative", "text": "negative", "from_band": back, "turn": swapped, "pad": " " * 9}
     return [positive, negative] if built.has("BIPOLAR") else [positive]
-
-
-def texts(files: dict[str, CoreFile], banner: Sequence[str] = ()) -> dict[str, str]:
-    """Return the text of each file, by name, without a firmware around it."""
-    templates = strict_templates("dzdesign.codegen.core", "dzdesign.codegen", autoescape=False)
-    return {name: templates.get_template(file.template).render(banner=banner, **file.values) for name, file in
-            files.items()}  # fmt: skip
 
 
 def _declarations(kind: type, built: BuiltFor) -> Iterator[str]:
