@@ -44,7 +44,6 @@ from dzdesign.codegen.core.constants import (
     defines,
     difference_place,
     drive_status_constants,
-    misra_lines,
     status_constants,
 )
 from dzdesign.codegen.core.integer_form import INT32_MAX
@@ -154,9 +153,8 @@ def _core_file(name: str, values: Values, constants: Sequence[Define]) -> CoreFi
     """Return a file that prints these constants."""
     return CoreFile(
         template=f"{name}.jinja",
-        values={**values, "misra_lines": misra_lines(name, fixed=bool(values["fixed"])),
-                "constants": defines(constants)},
-    )  # fmt: skip
+        values={**values, "constants": defines(constants)},
+    )
 
 
 def _valve_header(page: ValvePage) -> CoreFile:
@@ -165,7 +163,6 @@ def _valve_header(page: ValvePage) -> CoreFile:
     chosen, units = law(c.law), c.valve.recorded_units.of_controller
     values: Values = {
         **_form(page.built),
-        "misra_lines": misra_lines(VALVE_HEADER, fixed=True),
         "u_max": units.text(float(c.u_max_V), "g V"),
         "law_text": str(chosen.output).replace("**", "^"),
         "law_equation": equation_of(chosen),
