@@ -175,7 +175,7 @@ def test_a_clock_that_does_not_divide_is_refused(monkeypatch, module, name, valu
 def test_a_context_that_takes_a_name_of_the_renderer_is_refused(monkeypatch):
     target = replace(target_named("host"), context={"signals": "none"})
     monkeypatch.setattr(project, "target_named", lambda _: target)
-    with pytest.raises(DzdesignError, match="signals.* belong to the renderer"):
+    with pytest.raises(DzdesignError, match=r"signals.* belong to the renderer"):
         generate(golden_compensator("host"), "host")
 
 
