@@ -2,12 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 
-from dzdesign.codegen.core.constants import CoreFile
 from dzdesign.core.strict_templates import strict_templates
 
 
-def texts(files: Mapping[str, CoreFile], banner: Sequence[str] = ()) -> dict[str, str]:
+def texts(files: Mapping[str, Mapping[str, object]], banner: Sequence[str] = ()) -> dict[str, str]:
     """Return the text of each file, by name."""
     templates = strict_templates("dzdesign.codegen.core", "dzdesign.codegen", autoescape=False)
-    return {name: templates.get_template(file.template).render(banner=banner, **file.values) for name, file in
+    return {name: templates.get_template(f"{name}.jinja").render(banner=banner, **values) for name, values in
             files.items()}  # fmt: skip

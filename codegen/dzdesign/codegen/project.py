@@ -1,6 +1,6 @@
 """`generate`: a `Compensator` and a target in, the files of a C project out."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
@@ -21,7 +21,7 @@ from dzdesign.codegen.calibration.files import (
 from dzdesign.codegen.calibration.layout import BuiltFor, CalibrationBlock
 from dzdesign.codegen.calibration.packing import OCTETS, pack
 from dzdesign.codegen.core.certificate_text import zero_command
-from dzdesign.codegen.core.constants import FAULT_BITS, CoreFile, Values
+from dzdesign.codegen.core.constants import FAULT_BITS, Values
 from dzdesign.codegen.loading.protocol import LOAD_FILES, STORE, load_texts
 from dzdesign.codegen.target import Target, folder_of
 from dzdesign.codegen.vectors import vectors_text
@@ -126,15 +126,18 @@ def generate(
     banner, block = banner_of(compensator, digest), None
     if calibration == "block":
         block = block_of(compensator, digest)
-        core = _in_core(block_core_files(built_for(compensator)))
+        core = block_core_files(built_for(compensator))
         first_lines = banner.of_any_valve
     else:
-        core = _in_core(fixed_core_files(compensator))
+        core = fixed_core_files(compensator)
         first_lines = banner.lines
-    files = {
-        path: _render(PACKAGE, file.template, first_lines(file.template), file.values) for path, file in core.items()
-    }
-    files |= target_files(compensator, target, banner, block) | TEXT_AS_IT_IS | {"compensator.json": document.decode()}
+    texts = _core_texts(core, first_lines)
+    files = (
+        texts
+        | target_files(compensator, target, banner, block)
+        | TEXT_AS_IT_IS
+        | {"compensator.json": document.decode()}
+    )
     octets = pack(block) if block else b""
     if vectors:
         files[VECTORS_NAME] = vectors_text(compensator, vectors)
@@ -144,7 +147,7 @@ def generate(
         target=target.name,
         calibration=calibration,
         law=compensator.law,
-        core=tuple(sorted(core)),
+        core=tuple(sorted(texts)),
         board=tuple(sorted(target.board | (board_of_blocks(target) if block else frozenset()))),
         origin=origin_of(compensator, digest),
         vectors=vectors,
@@ -162,16 +165,13 @@ def origin_of(compensator: Compensator, digest: str) -> FirmwareOrigin:
 
 def block_core(built: BuiltFor) -> dict[str, str]:
     """Return the core of the firmware in block form, path to text: the same for every valve that it is compiled for."""
-    lines = Banner(digest="").of_any_valve  # which names no compensator
-    return {
-        path: _render(PACKAGE, file.template, lines(file.template), file.values)
-        for path, file in _in_core(block_core_files(built)).items()
-    }
+    return _core_texts(block_core_files(built), Banner(digest="").of_any_valve)  # which names no compensator
 
 
-def _in_core(files: Mapping[str, CoreFile]) -> dict[str, CoreFile]:
-    """Return files of the core by their paths in the firmware."""
-    return {f"core/{name}": file for name, file in files.items()}
+def _core_texts(core: Mapping[str, Values], lines: Callable[[str], Sequence[str]]) -> dict[str, str]:
+    """Return the files of the core by their paths in the firmware; `lines` gives the first lines of a template's."""
+    templates = {name: f"{name}.jinja" for name in core}
+    return {f"core/{name}": _render(PACKAGE, each, lines(each), core[name]) for name, each in templates.items()}
 
 
 def target_files(

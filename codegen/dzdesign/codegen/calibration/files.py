@@ -5,7 +5,7 @@ firmware in block form the one that its caller passes, else the `static const` o
 folds into the code.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from fractions import Fraction
 
@@ -36,7 +36,6 @@ from dzdesign.codegen.core.certificate_text import (
 )
 from dzdesign.codegen.core.constants import (
     LITERALS,
-    CoreFile,
     Define,
     Values,
     c_comment,
@@ -80,26 +79,26 @@ BLOCK_SOURCE, BLOCK_HEADER, LINKER_FILE = "dz_block.c", "dz_block.h", "dz_calibr
 CRC_POLYNOMIAL = 0xEDB88320
 
 
-def block_core_files(built: BuiltFor) -> dict[str, CoreFile]:
-    """Return every file of the core in block form, by its name: they depend on no valve."""
+def block_core_files(built: BuiltFor) -> dict[str, Values]:
+    """Return what each file of the core in block form prints, by its name: it depends on no valve."""
     return _files(built)
 
 
-def fixed_core_files(compensator: Compensator) -> dict[str, CoreFile]:
-    """Return every file of the core with the numbers of a compensator in it, by its name."""
+def fixed_core_files(compensator: Compensator) -> dict[str, Values]:
+    """Return what each file of the core with the numbers of a compensator in it prints, by its name."""
     built = built_for(compensator, fixed=True)
     return valve_files(ValvePage(compensator=compensator, block=numbers_of(compensator), built=built))
 
 
-def valve_files(page: ValvePage) -> dict[str, CoreFile]:
-    """Return every file of a core that has these numbers in it."""
+def valve_files(page: ValvePage) -> dict[str, Values]:
+    """Return what each file of a core that has these numbers in it prints."""
     return {VALVE_HEADER: _valve_header(page), **_files(page.built, page.block)}
 
 
-def _files(built: BuiltFor, numbers: CalibrationBlock | None = None) -> dict[str, CoreFile]:
+def _files(built: BuiltFor, numbers: CalibrationBlock | None = None) -> dict[str, Values]:
     """Return what both forms have; `numbers` are those that stand in the firmware."""
     plan = _plan(built)
-    return {name: _core_file(name, plan, constants) for name, constants in _constants(built, numbers).items()}
+    return {name: {**plan, "constants": defines(constants)} for name, constants in _constants(built, numbers).items()}
 
 
 def core_sources(*, block: bool, current: bool) -> tuple[str, ...]:
@@ -149,19 +148,11 @@ def _plan(built: BuiltFor) -> Values:
     }
 
 
-def _core_file(name: str, values: Values, constants: Sequence[Define]) -> CoreFile:
-    """Return a file that prints these constants."""
-    return CoreFile(
-        template=f"{name}.jinja",
-        values={**values, "constants": defines(constants)},
-    )
-
-
-def _valve_header(page: ValvePage) -> CoreFile:
+def _valve_header(page: ValvePage) -> Values:
     """Return dz_valve.h: the numbers, and what they are certified for."""
     c = page.compensator
     chosen, units = law(c.law), c.valve.recorded_units.of_controller
-    values: Values = {
+    return {
         **_form(page.built),
         "u_max": units.text(float(c.u_max_V), "g V"),
         "law_text": str(chosen.output).replace("**", "^"),
@@ -179,7 +170,6 @@ def _valve_header(page: ValvePage) -> CoreFile:
         ],
         "lines": page.lines(),
     }
-    return CoreFile(template=f"{VALVE_HEADER}.jinja", values=values)
 
 
 def _rational(value: Fraction) -> str:

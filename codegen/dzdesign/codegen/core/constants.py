@@ -44,14 +44,6 @@ class Define:
         return [*self.comment(), f"#define {self.symbol} {LITERALS[self.literal].format(self.value)}"]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CoreFile:
-    """One file of the core: its template, and what this prints."""
-
-    template: str
-    values: Values
-
-
 def c_comment(text: str, columns: int = COLUMNS) -> list[str]:
     """Return a comment of C, its lines no longer than `columns`.
 
