@@ -172,10 +172,11 @@ def test_a_clock_that_does_not_divide_is_refused(monkeypatch, module, name, valu
         getattr(module, derived)()
 
 
-def test_a_context_that_takes_a_name_of_the_renderer_is_refused(monkeypatch):
-    target = replace(target_named("host"), context={"signals": "none"})
+@pytest.mark.parametrize("name", ["signals", "banner"])
+def test_a_context_that_takes_a_name_of_the_renderer_is_refused(name, monkeypatch):
+    target = replace(target_named("host"), context={name: "none"})
     monkeypatch.setattr(project, "target_named", lambda _: target)
-    with pytest.raises(DzdesignError, match=r"signals.* belong to the renderer"):
+    with pytest.raises(DzdesignError, match=rf"{name}.* belong to the renderer"):
         generate(golden_compensator("host"), "host")
 
 

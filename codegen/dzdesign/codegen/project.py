@@ -206,7 +206,7 @@ def target_files(
         "on_cortex_m4": target.name == "cortex-m4",
         "certificate_reach": fill(reach_of_certificate(compensator), README_COLUMNS),
     }
-    if taken := sorted(values.keys() & target.context.keys()):
+    if taken := sorted({"banner", "project", *values} & target.context.keys()):
         raise DzdesignError(f"target {target.name}: context names {taken} belong to the renderer")
     values |= target.context
     in_block_form = {**block_templates(target, block), **(target.block_templates if block else {})}
