@@ -1,10 +1,12 @@
 """FMUs of the example: the checks of `verify`, another tool, the sources compiled again."""
 
+import json
 import os
 import shutil
 import subprocess
 import sys
 import tempfile
+from dataclasses import asdict
 from pathlib import Path
 from time import perf_counter
 
@@ -17,8 +19,11 @@ from dzdesign.codegen.writing import write_generated
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
 from dzdesign.design.options import options_of
+from dzdesign.example import example_folder
+from dzdesign.verify.closed_loop.plant import read_plant
 from dzdesign.verify.folder import read_output_manifest
 from dzdesign.verify.outputs import fmu
+from dzdesign.verify.requirements import FMU_CLOSED_LOOP
 
 STEP_S, STOP_S = 1 / 2500, 0.1
 
@@ -28,10 +33,11 @@ def print_fmus(quick: bool = False, seed: int = 0) -> list[Row]:
     del seed
     every_code = {"pressure_a": "0..3 V", "pressure_b": "0..3 V", "accept": "broken-sensor"}
     compensator = design(example_valve(), options_of(every_code, target_named("f28335").inputs()))
+    plant = json.dumps(asdict(read_plant(example_folder() / "plant.toml")))
     with tempfile.TemporaryDirectory(prefix="bench-outputs-") as place:
         folder = Path(place) / "fmus"
         begin = perf_counter()
-        first, again = (generate_output(compensator, "fmu", {}) for _ in range(2))
+        first, again = (generate_output(compensator, "fmu", {"plant": plant}) for _ in range(2))
         seconds = (perf_counter() - begin) / 2
         write_generated(first, folder)
         differing = sum(first.files[name] != again.files[name] for name in first.files)
@@ -55,6 +61,8 @@ def _checked(folder: Path, compensator: Compensator) -> list[Row]:
     for check in missed:
         print(f"{check.name}: {check.text}")
     rows.append(Row(what="checks of verify that do not hold", value=len(missed), limit=0, note=f"{seconds:.0f} s"))
+    for check in (check for check in found.checks if check.id == FMU_CLOSED_LOOP.id):
+        rows.append(Row(what=check.name, value=float(check.text.split("at most ")[1].split()[0]), limit=1e-4))
     return rows
 
 
@@ -84,9 +92,11 @@ def _compiled_again(folder: Path, place: Path) -> Row:
         fmpy.extract(str(file), unzipdir=str(unpacked))
         shutil.rmtree(unpacked / "binaries")
         build_platform_binary(unpacked, build)
+        of_plant = "plant" in file.name
         how = {
             "stop_time": STOP_S, "output_interval": STEP_S, "fmi_type": "CoSimulation",
-            "start_values": {"u_i": 4.0, "p_A": 3.0, "p_B": 1.0}, "output": ["u_O", "beta", "compare_a"],
+            "start_values": {"compare": 50000} if of_plant else {"u_i": 4.0, "p_A": 3.0, "p_B": 1.0},
+            "output": ["Q", "x"] if of_plant else ["u_O", "beta", "compare_a"],
         }  # fmt: skip
         first, again = (fmpy.simulate_fmu(str(each), **how) for each in (file, unpacked))
         others += not all(np.allclose(first[name], again[name], rtol=1e-9, atol=1e-12) for name in first.dtype.names)

@@ -3,6 +3,7 @@
 import pytest
 
 from dzdesign import api
+from dzdesign.codegen.fmu.files import note_of
 from dzdesign.codegen.other_targets import generate_output, settings_of
 from dzdesign.codegen.writing import write_generated
 from dzdesign.command_line.cli import main
@@ -45,3 +46,8 @@ def test_with_replace_it_is_written_over_and_said(run, tmp_path, capsys):
 def test_the_same_kind_with_other_settings_is_written_again(run, tmp_path):
     assert run("iec61131", "--dialect", "twincat") == 0
     assert (tmp_path / "plc" / "FB_DeadZone.TcPOU").is_file()
+
+
+def test_fmus_without_a_plant_say_how_to_have_one(compensator):
+    assert "--plant PLANT.toml" in note_of(compensator, {"plant": ""})
+    assert note_of(compensator, {"plant": "{}"}) == ""

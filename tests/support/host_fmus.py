@@ -1,8 +1,9 @@
 """FMUs of the goldens' compensator with everything switched on, with this machine's binaries alone; and wrong ones."""
 
+import json
 import shutil
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import fmpy
@@ -11,9 +12,12 @@ from dzdesign.codegen.fmu import files
 from dzdesign.codegen.fmu.files import archive
 from dzdesign.codegen.other_targets import Output, generate_output
 from dzdesign.design.compensator import Compensator
+from dzdesign.verify.closed_loop.plant import Plant
 from dzdesign.verify.outputs.fmu import Unpacked
 from dzdesign.verify.toolchain.host_compiler import built, host_compiler, words_of
 from tests.support.golden_firmware import FULL, golden_compensator
+
+PLANT = Plant()
 
 
 def full_compensator() -> Compensator:
@@ -26,9 +30,15 @@ def host_platforms() -> tuple[files.Platform, ...]:
     return tuple(each for each in files.PLATFORMS if each.folder in (fmpy.platform, fmpy.platform_tuple))[-1:]
 
 
-def fmus_of(compensator: Compensator) -> Output:
-    """Return the FMU, with the binaries of the platforms that `files.PLATFORMS` has now."""
-    return generate_output(compensator, "fmu", {})
+def plant_setting(plant: Plant = PLANT) -> str:
+    """Return a plant as the setting of an output."""
+    return json.dumps({name: float(value) for name, value in asdict(plant).items()})
+
+
+def fmus_of(compensator: Compensator, plant: Plant | None = PLANT) -> Output:
+    """Return the FMUs, with the binaries of the platforms that `files.PLATFORMS` has now."""
+    settings = {"plant": plant_setting(plant) if plant else ""}
+    return generate_output(compensator, "fmu", settings)
 
 
 def written(output: Output, folder: Path) -> Path:

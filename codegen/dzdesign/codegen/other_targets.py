@@ -52,8 +52,9 @@ OTHER_TARGETS: Mapping[str, OtherTarget] = {
         ),
         OtherTarget(
             name="fmu",
-            description="an FMU of the compensator for simulation tools, FMI 2.0",
+            description="FMUs for simulation tools, FMI 2.0: the compensator and, with --plant, the plant",
             module="dzdesign.codegen.fmu.files",
+            options={"plant": ()},
         ),
         OtherTarget(
             name="matlab",

@@ -82,6 +82,10 @@ class FirmwareManifest(Artefact):
     files: Annotated[Mapping[Text, Sha256], Meta(description="SHA-256 of each generated file, by file name.")]
 
 
+#: Characters of a setting in a sentence.
+LONGEST_SETTING = 20
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OutputManifest(Artefact):
     """Files of an output and their origin, as `dzdesign codegen` writes it."""
@@ -101,16 +105,17 @@ class OutputManifest(Artefact):
 
     @property
     def settings_in_words(self) -> str:
-        """Return the settings behind commas."""
+        """Return the settings behind commas; of a long one, such as a plant, the name alone."""
         return "".join(f", {word}" for word in setting_words(self.settings))
 
 
 def setting_words(settings: Mapping[str, str]) -> list[str]:
-    """Return each setting that is not empty, as its option is called.
+    """Return each setting that is not empty, as its option is called; of a long one, such as a plant, the name alone.
 
     Examples
     --------
-    >>> setting_words({"table_dp": "2 MPa", "threshold": ""})
-    ['table-dp 2 MPa']
+    >>> setting_words({"table_dp": "2 MPa", "plant": ""}), setting_words({"plant": "{" + 20 * " " + "}"})
+    (['table-dp 2 MPa'], ['with a plant'])
     """
-    return [f"{name.replace('_', '-')} {value}" for name, value in settings.items() if value]
+    words = {name.replace("_", "-"): value for name, value in settings.items() if value}
+    return [f"{name} {value}" if len(value) <= LONGEST_SETTING else f"with a {name}" for name, value in words.items()]

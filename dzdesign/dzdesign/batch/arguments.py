@@ -33,7 +33,8 @@ class BatchArguments(OutputChoices, DesignChoices, IdentifyChoices):
     verify: Annotated[bool, Option()] = False
     """Verify each valve's firmware and outputs too, as the command verify does."""
     plant: Annotated[AnyPath | None, Option("PLANT.toml")] = None
-    """File with the plant of the closed loop, for the verification."""
+    """File with the plant of the closed loop, for the verification. The output fmu then also includes an FMU of the
+    plant."""
     outputs: Annotated[Text, Option("NAMES")] = None
     """Outputs for each valve in addition to its firmware, separated by commas: iec61131, fmu, matlab,
     amplifier."""

@@ -61,10 +61,10 @@ def wanted_outputs(args: BatchArguments) -> tuple[WantedOutput, ...]:
     of_outputs = dict.fromkeys(option for each in OTHER_TARGETS.values() for option in each.options)
     for option in (name for name in of_outputs if getattr(args, name) is not None):
         owners = [each.name for each in OTHER_TARGETS.values() if option in each.options]
-        if not set(owners) & set(names):
-            raise InputError(f"{flag_of(option)} needs the output {' or '.join(owners)}; add --outputs {owners[0]}, "
-                             "or leave it out")  # fmt: skip
-    given = chosen_of_outputs(args)
+        if not set(owners) & set(names) and not (option == "plant" and args.verify):
+            raise InputError(f"{flag_of(option)} needs the output {' or '.join(owners)}; add --outputs {owners[0]}"
+                             f"{' or --verify' if option == 'plant' else ''}, or leave it out")  # fmt: skip
+    given = chosen_of_outputs(args)  # which reads files
     return tuple(
         WantedOutput(
             target=name,

@@ -34,6 +34,9 @@ class OutputChoices:
     interface: Annotated[Text, Option("NAME", OUTPUTS)] = None
     """Inputs of the function block, for iec61131 (default: plc). plc: command in 0.01 % and pressures in 0.1 bar.
     codes: the converter codes of the design."""
+    plant: Annotated[AnyPath | None, Option("PLANT.toml", OUTPUTS)] = None
+    """File with a plant, for an FMU of the plant in addition, such as demo/example/plant.toml. It is for the
+    output fmu only."""
     device: Annotated[Text, Option("DEVICE", OUTPUTS, choices=DEVICES)] = None
     """Device, for amplifier: west, west-pam190, west-pos123, cia408, rmc, rmc75, beckhoff or csv."""
     table_dp: Annotated[Text, Option("P", OUTPUTS, example="1 MPa", read=quantity("pressure"))] = None
@@ -134,12 +137,24 @@ def _other_output(arguments: GenerateArguments, target: str) -> "Output":
 
 
 def chosen_of_outputs(arguments: OutputChoices) -> "dict[str, str | None]":
-    """Return the options that are of one output other than a C firmware alone, as they were given."""
+    """Return the options that are of one output other than a C firmware alone, as they were given; a plant is read."""
     from dzdesign.codegen.amplifier.setting import given_dp_MPa, given_threshold
     from dzdesign.codegen.other_targets import OTHER_TARGETS
 
     given_dp_MPa(arguments.table_dp), given_threshold(arguments.threshold)  # a wrong one is refused before any file
-    return {name: getattr(arguments, name) for other in OTHER_TARGETS.values() for name in other.options}
+    given = {name: getattr(arguments, name) for other in OTHER_TARGETS.values() for name in other.options}
+    return given | {"plant": None if arguments.plant is None else _plant_text(Path(arguments.plant))}
+
+
+def _plant_text(path: Path) -> str:
+    """Return a plant file's parameters as the setting that stands in a manifest: JSON, those by default included."""
+    import json
+    from dataclasses import asdict
+
+    from dzdesign.terminal.progress import say
+    from dzdesign.verify.closed_loop.plant import read_plant
+
+    return json.dumps({name: float(value) for name, value in asdict(read_plant(path, say)).items()})
 
 
 def _compensator(arguments: GenerateArguments, target: str) -> "tuple[Compensator, bool]":

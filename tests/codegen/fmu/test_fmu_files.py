@@ -2,7 +2,7 @@
 
 import json
 import subprocess
-from dataclasses import replace
+from dataclasses import asdict, fields, replace
 from io import BytesIO
 from zipfile import ZipFile
 
@@ -11,9 +11,13 @@ import pytest
 from dzdesign.codegen.fmu import files
 from dzdesign.codegen.fmu.description import UNITS
 from dzdesign.codegen.fmu.files import archive
+from dzdesign.codegen.fmu.models import PARAMETERS
+from dzdesign.codegen.other_targets import generate_output
 from dzdesign.core.errors import InputError
+from dzdesign.stages.generate import GenerateArguments, generate
+from dzdesign.verify.closed_loop.plant import Plant
 from tests.support.golden_firmware import golden_compensator
-from tests.support.host_fmus import fmus_of, full_compensator, host_platforms
+from tests.support.host_fmus import PLANT, fmus_of, full_compensator, host_platforms, plant_setting
 
 
 @pytest.fixture
@@ -34,7 +38,7 @@ def opened(content):
 
 
 def test_the_same_input_gives_the_same_bytes(one_binary):
-    first, again = (fmus_of(full_compensator()).files for _ in range(2))
+    first, again = (fmus_of(full_compensator(), None).files for _ in range(2))
     assert dict(first) == dict(again) and len(first) == 3
 
 
@@ -47,12 +51,21 @@ def test_a_zip_has_no_date_and_one_order():
     assert entries[2].external_attr >> 16 & 0o111 and not entries[1].external_attr >> 16 & 0o111
 
 
-def test_the_token_is_of_the_compensator(no_binary):
-    tokens = {
-        json.loads(opened(fmus_of(each).files["dz_compensator.fmu"])["extra/dzdesign/manifest.json"])["token"]
-        for each in (full_compensator(), golden_compensator("host"))
-    }
-    assert len(tokens) == 2
+def test_every_fmu_has_a_token_of_its_own_and_of_its_compensator(no_binary):
+    def tokens(compensator, plant=PLANT):
+        made = fmus_of(compensator, plant).files
+        return {
+            name: json.loads(opened(content)["extra/dzdesign/manifest.json"])["token"]
+            for name, content in made.items()
+            if name.endswith(".fmu")
+        }
+
+    first = tokens(full_compensator())
+    assert len(set(first.values())) == 2
+    assert tokens(golden_compensator("host"))["dz_compensator.fmu"] != first["dz_compensator.fmu"]
+    moved = tokens(full_compensator(), replace(PLANT, L_c_H=0.05))
+    changed = {name for name in first if moved[name] != first[name]}
+    assert changed == {"dz_plant.fmu"}
 
 
 def test_the_core_in_an_fmu_is_that_of_the_firmware(no_binary):
@@ -61,7 +74,7 @@ def test_the_core_in_an_fmu_is_that_of_the_firmware(no_binary):
     compensator = full_compensator()
     core = {path.removeprefix("core/"): text.encode() for path, text in
             generate_project(compensator, "host").files.items() if path.startswith("core/")}  # fmt: skip
-    inside = opened(fmus_of(compensator).files["dz_compensator.fmu"])
+    inside = opened(fmus_of(compensator, None).files["dz_compensator.fmu"])
     assert {name: inside[f"sources/{name}"] for name in core} == core
 
 
@@ -100,7 +113,7 @@ def displayed(model, name):
 
 def test_the_display_unit_of_a_command_is_that_of_its_side_and_of_no_other_voltage():
     """A reading of 12 mA at zero command falls on the negative side, whose outputs count from zero outwards."""
-    from dzdesign.codegen.fmu.models import compensator_model
+    from dzdesign.codegen.fmu.models import compensator_model, plant_model
     from dzdesign.core.recorded_units import CommandUnit, PressureUnit, RecordedUnits
 
     def of(command):
@@ -114,6 +127,9 @@ def test_the_display_unit_of_a_command_is_that_of_its_side_and_of_no_other_volta
     assert displayed(compensator_model(of(CommandUnit(unit="%", factor=10.0))), "u_O_negative") == ("V", "%", 10.0, 0.0)
     in_bar = replace(model, units=RecordedUnits(pressure=PressureUnit(unit="bar", factor=10.0)))
     assert displayed(in_bar, "p_A") == ("MPa", "bar", 10.0, 0.0)
+    plant = plant_model(asdict(PLANT), centred)
+    for name in ("voltage", "u_max_V", "hysteresis_V"):
+        assert displayed(plant, name) == ("V", None)
 
 
 def test_the_output_of_a_current_controller_is_a_current(no_binary):
@@ -129,6 +145,30 @@ def test_the_output_of_a_current_controller_is_a_current(no_binary):
     assert values["full_output"] == repr(float(rated_A)) != values["u_max"]
 
 
+def test_the_plants_parameters_are_those_of_its_file():
+    assert list(PARAMETERS) == [field.name for field in fields(Plant)]
+
+
+@pytest.mark.parametrize(
+    "setting",
+    ("no JSON", "[]", "{}", json.dumps({**asdict(PLANT), "K_b": 1}), json.dumps({**asdict(PLANT), "K_a": "x"})),
+)
+def test_what_is_no_plant_is_refused(setting, no_binary):
+    with pytest.raises(InputError, match="plant"):
+        generate_output(full_compensator(), "fmu", {"plant": setting})
+
+
+def test_a_plant_behind_a_current_controller_is_refused(no_binary, monkeypatch):
+    from dzdesign.codegen.fmu.models import plant_of
+
+    class Current:
+        current_drive = object()
+
+    with pytest.raises(InputError, match="--plant"):
+        plant_of(plant_setting(), Current())
+    assert plant_of("", Current()) is None
+
+
 @pytest.mark.parametrize(
     ("name", "instead", "named"),
     [
@@ -142,7 +182,7 @@ def test_without_a_ziglang_that_will_do_it_is_said_how_to_install_it(name, inste
     files.made_with.cache_clear()
     try:
         with pytest.raises(InputError, match=named):
-            fmus_of(full_compensator())
+            fmus_of(full_compensator(), None)
     finally:
         files.made_with.cache_clear()
 
@@ -158,16 +198,25 @@ def test_c_that_is_none_or_needs_a_library_is_refused(text, named, monkeypatch):
         files.binaries_of("dz_wrong", {"dz_fmu.c": text.encode()})
 
 
+def test_a_plant_is_of_the_target_fmu_alone(example_compensator, example_folder, tmp_path):
+    arguments = {"target": "host", "plant": example_folder / "plant.toml", "output": tmp_path / "made"}
+    with pytest.raises(InputError, match="--plant is an option of target fmu"):
+        generate(GenerateArguments(example_compensator, **arguments))
+    with pytest.raises(InputError, match="missing"):
+        generate(GenerateArguments(example_compensator, target="fmu", plant=tmp_path / "missing.toml"))
+    assert not (tmp_path / "made").exists()
+
+
 @pytest.mark.slow
 def test_binaries_of_every_platform_are_valid_for_fmpy(tmp_path):
     from fmpy.validation import validate_fmu
 
     made = fmus_of(golden_compensator("host"))
-    path = tmp_path / "dz_compensator.fmu"
-    path.write_bytes(made.files[path.name])
-    assert validate_fmu(str(path)) == []
-    binaries = {each.split("/")[1] for each in opened(path.read_bytes()) if each.startswith("binaries/")}
-    assert binaries == {"linux64", "win64", "darwin64", "aarch64-linux", "aarch64-darwin"}
+    for name in ("dz_compensator.fmu", "dz_plant.fmu"):
+        (tmp_path / name).write_bytes(made.files[name])
+        assert validate_fmu(str(tmp_path / name)) == []
+        binaries = {path.split("/")[1] for path in opened(made.files[name]) if path.startswith("binaries/")}
+        assert binaries == {"linux64", "win64", "darwin64", "aarch64-linux", "aarch64-darwin"}
 
 
 def test_units_are_those_of_pint():

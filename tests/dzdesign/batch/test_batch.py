@@ -350,7 +350,7 @@ def test_a_bad_list_stops_before_anything_is_written(text, words, tmp_path, caps
     [
         (["--jobs", "0"], "--jobs is '0'"),
         (["--jobs", "2", "--dask", "tcp://127.0.0.1:1"], "leave it out"),
-        (["--plant", "p.toml"], "needs --verify"),
+        (["--plant", "p.toml"], "or --verify"),
         (["--meter-lag", "3 V"], "--meter-lag"),
         (["--guard", "opning"], "did you mean 'opening'?"),
         (["--target", "f28334"], "did you mean 'f28335'?"),

@@ -2,6 +2,7 @@
 
 import csv
 import io
+import json
 import shutil
 from dataclasses import replace
 from types import SimpleNamespace
@@ -50,6 +51,7 @@ V0002,V0002/*.csv,current,3.5 ohm 40 mH,1 A,18..32 V,0..1.2 A on 2 ohm + 0.15 V
         {"outputs": ""},
         {"outputs": "iec61131", "dialect": "twncat"},
         {"outputs": "fmu", "dialect": "twincat"},
+        {"outputs": "iec61131", "plant": "examples/paper_valve/plant.toml"},
         {"interface": "codes"},
         {"outputs": "amplifier"},
         {"outputs": "iec61131", "device": "west"},
@@ -64,9 +66,11 @@ def test_what_can_not_be_wanted_is_refused(given, wording, request):
 
 def test_the_settings_are_those_of_each_output():
     assert wanted_outputs(BatchArguments("lot")) == ()
-    plc, fmu = wanted_outputs(BatchArguments("lot", outputs=" iec61131, fmu", dialect="twincat"))
+    plant = {"plant": "examples/paper_valve/plant.toml"}
+    plc, fmu = wanted_outputs(BatchArguments("lot", outputs=" iec61131, fmu", dialect="twincat", **plant))
     assert (plc.settings, plc.folder) == ({"dialect": "twincat", "interface": "plc"}, "plc")
-    assert (fmu.settings, fmu.folder) == ({}, "fmu")
+    assert fmu.folder == "fmu" and json.loads(fmu.settings["plant"])
+    assert wanted_outputs(BatchArguments("lot", verify=True, **plant)) == ()  # of the verification alone
 
 
 def test_a_result_depends_on_the_outputs_that_are_wanted():

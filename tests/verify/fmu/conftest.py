@@ -15,7 +15,7 @@ def compensator():
 
 @pytest.fixture(scope="session")
 def fmu_folder(tmp_path_factory, compensator):
-    """Return a folder with the FMU of a compensator."""
+    """Return a folder with FMUs of a compensator and of a plant."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(files, "PLATFORMS", host_platforms())
         return written(fmus_of(compensator), tmp_path_factory.mktemp("fmus"))
@@ -25,3 +25,9 @@ def fmu_folder(tmp_path_factory, compensator):
 def fmu(fmu_folder, tmp_path_factory):
     """Return the compensator's FMU."""
     return unpacked(fmu_folder / "dz_compensator.fmu", tmp_path_factory.mktemp("unpacked"))
+
+
+@pytest.fixture(scope="session")
+def plant_fmu(fmu_folder, tmp_path_factory):
+    """Return the plant's FMU."""
+    return unpacked(fmu_folder / "dz_plant.fmu", tmp_path_factory.mktemp("unpacked"))

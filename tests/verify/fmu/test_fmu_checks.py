@@ -1,25 +1,28 @@
-"""The checks of FMUs hold of right ones and fail of wrong ones: description, law, drive, units."""
+"""The checks of FMUs hold of right ones and fail of wrong ones: description, law, drive, units, closed loop."""
 
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
-from dzdesign.core.errors import RequirementError
+from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import PreparedInputs
 from dzdesign.verify.outputs import fmu as room
 from dzdesign.verify.outputs.fmu import (
     FMU_HOST,
     FmuCore,
+    closed_loop_check,
     drive_check,
     input_results,
     physical_check,
+    plant_of,
     unpacked,
 )
 from tests.support.golden_firmware import golden_compensator
-from tests.support.host_fmus import edited, fmus_of, repacked, with_binary
+from tests.support.host_fmus import PLANT, edited, fmus_of, plant_setting, repacked, with_binary
 
 
 @pytest.fixture(scope="module")
@@ -32,6 +35,7 @@ def fewer_rows(monkeypatch):
     """Step fewer rows than `verify` does."""
     monkeypatch.setattr(room, "PHYSICAL_ROWS", 300)
     monkeypatch.setattr(room, "DRIVE_SAMPLES", 900)
+    monkeypatch.setattr(room, "COURSE", room.COURSE[:5])
 
 
 def sampled(fmu, sign, prepared):
@@ -42,8 +46,8 @@ def failed(check):
     return check.holds is False and check.text
 
 
-def test_right_ones_hold(fmu, compensator, prepared):
-    assert fmu.problems == ()
+def test_right_ones_hold(fmu, plant_fmu, compensator, prepared):
+    assert fmu.problems == plant_fmu.problems == ()
     for sign in (1, -1):
         found = sampled(fmu, sign, prepared)
         assert found.faults == 0 and found.inputs > 5_000
@@ -84,6 +88,30 @@ def test_a_wrong_law_behind_the_getters_is_found(fmu, prepared, tmp_path, name, 
 )
 def test_a_wrong_drive_or_scaling_is_found(fmu, compensator, tmp_path, check, old, new):
     assert failed(check(edited(fmu, tmp_path, "dz_fmu.c", old, new), compensator))
+
+
+def test_the_coupled_fmus_run_as_the_closed_loop_also_with_a_fast_coil(fmu, plant_fmu, compensator, tmp_path):
+    assert closed_loop_check(fmu, plant_fmu, PLANT, compensator).holds is True
+    fast = edited(plant_fmu, tmp_path, "dz_fmu.c", "BEFORE_START, 0.04,", "BEFORE_START, 0.0004,")
+    assert closed_loop_check(fmu, fast, replace(PLANT, L_c_H=0.0004), compensator).holds is True
+    assert failed(closed_loop_check(fmu, fast, PLANT, compensator))
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    (
+        ("- value[V_K_ET_N_M] * x -", "- 1.0005 * value[V_K_ET_N_M] * x -"),
+        ("value[V_K_I_N_A] * (model->played_A - mean)", "value[V_K_I_N_A] * 0.0 * (model->played_A - mean)"),
+        ("smaller(larger(model->value[V_COMPARE] / COUNTS, 0.0), 1.0);", "0.999 * model->value[V_COMPARE] / COUNTS;"),
+        ("value[V_PRESSURE_FORCE_N_MPA] * dp", "value[V_PRESSURE_FORCE_N_MPA] * value[V_SUPPLY]"),
+        ("term *= -share /", "term *= -1.002 * share /"),
+        ("on ? model->value[V_U_MAX_V] : 0.0", "on ? 0.0 : model->value[V_U_MAX_V]"),
+    ),
+    ids=("spring", "play", "duty", "droop", "coil", "phase"),
+)
+def test_a_wrong_plant_is_found(fmu, plant_fmu, compensator, tmp_path, old, new):
+    found = closed_loop_check(fmu, edited(plant_fmu, tmp_path, "dz_fmu.c", old, new), PLANT, compensator)
+    assert "flows differ" in failed(found)
 
 
 @pytest.mark.parametrize(
@@ -138,7 +166,7 @@ def test_the_core_of_another_valve_is_found(fmu, compensator, prepared, tmp_path
     monkeypatch.setattr(files, "PLATFORMS", host_platforms())
     path = tmp_path / "dz_compensator.fmu"
     other = golden_compensator("f28335")
-    path.write_bytes(fmus_of(other).files[path.name])
+    path.write_bytes(fmus_of(other, None).files[path.name])
     whole = unpacked(path, tmp_path)
     assert not whole.problems and sampled(whole, 1, prepared).faults > 0
     with pytest.raises(RequirementError, match="guid"):
@@ -147,18 +175,27 @@ def test_the_core_of_another_valve_is_found(fmu, compensator, prepared, tmp_path
 
 def test_without_fmpy_an_fmu_could_not_be_checked(fmu_folder, compensator, monkeypatch):
     monkeypatch.setattr(room, "find_spec", lambda name: None)
-    (found,) = room.checks(fmu_folder, None, compensator, print).checks
+    manifest = SimpleNamespace(settings={"plant": plant_setting()})
+    (found,) = room.checks(fmu_folder, manifest, compensator, print).checks
     assert found.holds is None and "pip install" in found.text
 
 
 @pytest.mark.slow
 def test_the_checks_of_a_folder(fmu_folder, fmu, compensator, monkeypatch):
-    found = room.checks(fmu_folder, None, compensator, lambda text: None)
-    assert all(check.holds for check in found.checks)
-    assert {"fmu-valid", "exact-law", "fmu-drive"} <= {check.id for check in found.checks}
+    manifest = SimpleNamespace(settings={"plant": plant_setting()})
+    found = room.checks(fmu_folder, manifest, compensator, lambda text: None)
+    assert all(check.holds for check in found.checks) and {"fmu-valid", "exact-law", "fmu-closed-loop"} <= {
+        check.id for check in found.checks
+    }
     assert sum(each.inputs for each in found.inputs) > 4e7 and not sum(each.wrong for each in found.inputs)
     monkeypatch.setattr(room, "unpacked", lambda path, place: replace(fmu, binary=None))
-    assert [check.holds for check in room.checks(fmu_folder, None, compensator, print).checks] == [True, None]
+    assert [check.holds for check in room.checks(fmu_folder, manifest, compensator, print).checks] == [True, None]
+
+
+@pytest.mark.parametrize("text", ("{", "[]", '{"K_b": 1}', '{"K_a": "x"}', '{"K_a": -1}'))
+def test_a_setting_that_is_no_plant_is_refused(text):
+    with pytest.raises(InputError, match="plant"):
+        plant_of(SimpleNamespace(settings={"plant": text}))
 
 
 @pytest.mark.slow

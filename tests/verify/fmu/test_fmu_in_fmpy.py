@@ -3,6 +3,7 @@
 import shutil
 
 import fmpy
+import numpy as np
 import pytest
 
 from tests.support.fmu_importer import Importer
@@ -42,22 +43,46 @@ def test_model_exchange_shows_an_input_at_once(path):
         assert one.integer("compare") == before[0]
 
 
+@pytest.mark.parametrize(
+    ("name", "value"),
+    (("m_e_kg", 0.0), ("L_c_H", 1e-9), ("overlap_mm", 3.0), ("K_a", float("nan")), ("preload_N", -1.0)),
+)
+def test_parameters_that_are_no_plant_end_the_initialization(fmu_folder, name, value):
+    call = "Set(Real|Float64)" if value != value else "ExitInitializationMode"
+    with pytest.raises(Exception, match=call):
+        fmpy.simulate_fmu(str(fmu_folder / "dz_plant.fmu"), fmi_type="CoSimulation", stop_time=0.001,
+                          output_interval=STEP_S, start_values={name: value})  # fmt: skip
+
+
+def test_the_plant_is_held_at_its_stops(fmu_folder):
+    time = np.array([0, 0.05, 0.05, 0.15, 0.15, 0.25])
+    signal = np.array(
+        list(zip(time, [0, 0, 10, 10, 0, 0.0], strict=True)), dtype=[("time", float), ("voltage", float)]
+    )
+    run = fmpy.simulate_fmu(
+        str(fmu_folder / "dz_plant.fmu"), fmi_type="CoSimulation", stop_time=0.25, output_interval=1e-3, input=signal,
+        start_values={"stroke_mm": 1.5, "hysteresis_V": 0.0, "supply": 3.0}, output=["x", "at_stop"],
+    )  # fmt: skip
+    assert set(run["at_stop"]) == {-1, 0, 1} and run["x"].max() == 1.5e-3 and run["x"][-1] == 0.0
+
+
 @pytest.mark.slow
-def test_the_sources_compile_again_and_give_the_same(path, tmp_path):
+@pytest.mark.parametrize("name", ("dz_compensator", "dz_plant"))
+def test_the_sources_compile_again_and_give_the_same(fmu_folder, name, tmp_path):
     if shutil.which("cmake") is None:
         pytest.skip("cmake not found")
     from fmpy.build import build_platform_binary
 
+    source = fmu_folder / f"{name}.fmu"
     folder = tmp_path / "unpacked"
-    fmpy.extract(str(path), unzipdir=str(folder))
+    fmpy.extract(str(source), unzipdir=str(folder))
     shutil.rmtree(folder / "binaries")
     (tmp_path / "build").mkdir()
     build_platform_binary(folder, tmp_path / "build")
-    how = {
-        "stop_time": 0.02, "output_interval": STEP_S, "fmi_type": "CoSimulation",
-        "start_values": {"u_i": 4.0, "p_A": 3.0, "p_B": 1.0}, "output": ["u_O", "compare_a"],
-    }  # fmt: skip
-    first, again = (fmpy.simulate_fmu(str(each), **how) for each in (path, folder))
+    how = {"stop_time": 0.02, "output_interval": STEP_S, "fmi_type": "CoSimulation"}
+    how["start_values"] = {"u_i": 4.0, "p_A": 3.0, "p_B": 1.0} if name == "dz_compensator" else {"compare": 50000}
+    output = ["u_O", "compare_a"] if name == "dz_compensator" else ["Q", "x"]
+    first, again = (fmpy.simulate_fmu(str(each), output=output, **how) for each in (source, folder))
     assert len(first) > 40
     for each in first.dtype.names:
         assert first[each] == pytest.approx(again[each], rel=1e-9, abs=1e-12)

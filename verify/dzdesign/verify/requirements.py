@@ -129,6 +129,7 @@ FMU_DRIVE = Requirement(
     id="fmu-drive", title="Co-Simulation follows the drive's model one step later, and Model Exchange at once"
 )
 FMU_UNITS = Requirement(id="fmu-units", title="inputs in V and MPa give the exact law of their codes")
+FMU_CLOSED_LOOP = Requirement(id="fmu-closed-loop", title="the coupled FMUs behave as the closed loop")
 #: Of amplifiers: `export` checks a file before it writes it, `verify` that of a folder.
 READ_BACK = Requirement(id="amplifier-read-back", title="the file is read back", how="`export`, `verify`")
 SAFE = Requirement(

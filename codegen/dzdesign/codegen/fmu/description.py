@@ -1,4 +1,4 @@
-"""What the FMU says of itself: its variables, and modelDescription.xml of FMI 2.0, from the same table as its C."""
+"""What an FMU says of itself: its variables, and modelDescription.xml of FMI 2.0, from the same table as its C."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -8,10 +8,7 @@ from xml.sax.saxutils import quoteattr
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.core.version import __version__
 
-#: Of its binaries, as an identifier of C; of its C; and for a person.
-IDENTIFIER, SOURCE, TITLE = "dz_compensator", "dz_fmu.c", "dzdesign compensator"
-#: Of a default experiment, s.
-STOP_S = 10.0
+SOURCE = "dz_fmu.c"
 Kind = Literal["real", "integer", "boolean"]
 Causality = Literal["input", "output", "parameter"]
 #: In C: who may set a variable of that causality.
@@ -20,7 +17,23 @@ SETTINGS: Mapping[str, str] = {"input": "ALWAYS", "parameter": "BEFORE_START", "
 UNITS: Mapping[str, tuple[float, Mapping[str, int]]] = {
     "V": (1.0, {"kg": 1, "m": 2, "s": -3, "A": -1}),
     "MPa": (1e6, {"kg": 1, "m": -1, "s": -2}),
+    "L/min": (1 / 60_000, {"m": 3, "s": -1}),
     "A": (1.0, {"A": 1}),
+    "m": (1.0, {"m": 1}),
+    "m/s": (1.0, {"m": 1, "s": -1}),
+    "mm": (1e-3, {"m": 1}),
+    "V/A": (1.0, {"kg": 1, "m": 2, "s": -3, "A": -2}),
+    "ohm": (1.0, {"kg": 1, "m": 2, "s": -3, "A": -2}),
+    "H": (1.0, {"kg": 1, "m": 2, "s": -2, "A": -2}),
+    "kg": (1.0, {"kg": 1}),
+    "N": (1.0, {"kg": 1, "m": 1, "s": -2}),
+    "N/A": (1.0, {"kg": 1, "m": 1, "s": -2, "A": -1}),
+    "N/m": (1.0, {"kg": 1, "s": -2}),
+    "N s/m": (1.0, {"kg": 1, "s": -1}),
+    "N/MPa": (1e-6, {"m": 2}),
+    "N/(mm MPa)": (1e-3, {"m": 1}),
+    "kg/m3": (1.0, {"kg": 1, "m": -3}),
+    "MPa/(L/min)^2": (3.6e15, {"kg": 1, "m": -7}),
 }
 
 
@@ -77,17 +90,24 @@ class Variable:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Model:
-    """The compensator's FMU: what it is of, and its variables."""
+    """One FMU: what it is called, and its variables."""
 
+    #: Name of its binaries, an identifier of C.
+    identifier: str
+    title: str
     description: str
     #: In the order of their references.
     variables: tuple[Variable, ...]
-    #: What its C prints.
+    #: Of its C, and what that prints.
+    template: str
     values: Mapping[str, object]
-    #: C files of the core by name, and compensator.json.
-    core: Mapping[str, bytes]
-    document: bytes
+    #: C files of its own, and files of its data, by name.
+    core: Mapping[str, bytes] = field(default_factory=dict)
+    extra: Mapping[str, bytes] = field(default_factory=dict)
+    #: Offered for Model Exchange too, and not for Co-Simulation alone.
+    exchange: bool = False
     step_s: float
+    stop_s: float
     units: RecordedUnits = field(default_factory=RecordedUnits)
 
 
@@ -107,7 +127,7 @@ def model_description(model: Model, token: str) -> str:
     """Return modelDescription.xml."""
     head = {
         "fmiVersion": "2.0",
-        "modelName": TITLE,
+        "modelName": model.title,
         "guid": token,
         "description": model.description,
         "generationTool": f"dzdesign {__version__}",
@@ -115,22 +135,22 @@ def model_description(model: Model, token: str) -> str:
         "numberOfEventIndicators": 0,
     }
     children = [
-        *_interfaces(),
+        *_interfaces(model),
         _units(model),
         _element("LogCategories", {}, [_element("Category", {"name": "logStatusError"})]),
-        _element("DefaultExperiment", {"startTime": "0", "stopTime": STOP_S, "stepSize": model.step_s}),
+        _element("DefaultExperiment", {"startTime": "0", "stopTime": model.stop_s, "stepSize": model.step_s}),
         _element("ModelVariables", {}, [_variable(model, each) for each in model.variables]),
         _structure(model),
     ]
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{_element("fmiModelDescription", head, children)}\n'
 
 
-def _interfaces() -> list[str]:
+def _interfaces(model: Model) -> list[str]:
     files = _element("SourceFiles", {}, [_element("File", {"name": SOURCE})])
-    common = {"modelIdentifier": IDENTIFIER, "canNotUseMemoryManagementFunctions": True}
+    common = {"modelIdentifier": model.identifier, "canNotUseMemoryManagementFunctions": True}
     exchange = _element("ModelExchange", {**common, "completedIntegratorStepNotNeeded": True}, [files])
     stepped = _element("CoSimulation", {**common, "canHandleVariableCommunicationStepSize": True}, [files])
-    return [exchange, stepped]
+    return [exchange, stepped] if model.exchange else [stepped]
 
 
 def _displayed(model: Model, unit: str, command: bool) -> tuple[str, float, float] | None:
@@ -138,15 +158,16 @@ def _displayed(model: Model, unit: str, command: bool) -> tuple[str, float, floa
 
     That of the command is not a unit of other voltages.
     """
+    if unit not in ("V", "MPa", "L/min", "A") or (unit == "V" and not command):
+        return ("mm", 1e3, 0.0) if unit == "m" else None
     label = model.units.label(unit)
-    if unit == "V" and not command:
-        return None
     if label == unit:
         return None
     units = model.units
     if unit == "V":
         return label, units.command.factor, units.command.at_zero
-    return label, units.current.factor if unit == "A" and units.current else units.pressure.factor, 0.0
+    current = units.current.factor if units.current else 1.0
+    return label, {"MPa": units.pressure.factor, "L/min": units.flow.factor, "A": current}[unit], 0.0
 
 
 def _units(model: Model) -> str:

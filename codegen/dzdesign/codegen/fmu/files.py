@@ -1,7 +1,7 @@
-"""The FMU of a compensator: `output_files` returns it.
+"""FMUs of a compensator, and of a plant where one is given: `output_files` returns them.
 
 One machine compiles the binaries of every platform, by ziglang; they need no library. The headers of the standard come
-with FMPy, which `verify` runs the FMU by.
+with FMPy, which `verify` runs the FMUs by.
 """
 
 import json
@@ -23,8 +23,8 @@ from zipfile import ZIP_DEFLATED, BadZipFile, ZipFile, ZipInfo
 from zlib import error as ZlibError
 
 from dzdesign.codegen.banner import banner_of
-from dzdesign.codegen.fmu.description import IDENTIFIER, SOURCE, TITLE, model_description
-from dzdesign.codegen.fmu.models import compensator_model
+from dzdesign.codegen.fmu.description import SOURCE, Model, model_description
+from dzdesign.codegen.fmu.models import compensator_model, plant_model, plant_of
 from dzdesign.core.artefact_files import TOOL, sha256_of
 from dzdesign.core.errors import MissingToolError, quoted
 from dzdesign.core.processes.running import run_program
@@ -84,35 +84,22 @@ PLATFORMS = (
 def output_files(
     compensator: Compensator, origin: FirmwareOrigin, settings: Mapping[str, str]
 ) -> Mapping[str, bytes]:
-    """Return the FMU, name to bytes.
+    """Return the FMUs, name to bytes: of the compensator, and of the plant in the settings, as JSON, if there is one.
 
-    The same input, ziglang and FMPy give the same bytes. Without these two it is an `InputError`.
+    The same input, ziglang and FMPy give the same bytes. Without these two, or for a plant behind a current controller,
+    it is an `InputError`.
     """
-    del settings  # it has none
     made_with()
-    model, digest = compensator_model(compensator), origin.compensator_json
-    # What ties a binary to its modelDescription.xml.
-    extra = {Compensator.FILE_NAME: model.document}
-    made_from = (digest, IDENTIFIER, model.variables, sorted(extra.items()), TOOL)
-    token = f"{{{uuid.UUID(sha256_of(repr(made_from).encode())[:32])}}}"
-    values = {
-        **model.values,
-        "banner": banner_of(compensator, digest).lines("dz_fmu.c.jinja"),
-        "title": TITLE.replace("dzdesign ", "").capitalize(),
-        "token": token,
-        "variables": model.variables,
-    }
-    template = strict_templates("dzdesign.codegen.fmu", autoescape=False).get_template("dz_fmu.c.jinja")
-    sources = {SOURCE: str(template.render(values)).encode(), **model.core, **_headers()}
-    manifest = {"schema": SCHEMA, "tool": TOOL, "made_with": made_with(), "compensator_json": digest, "token": token}
-    made = archive({
-        "modelDescription.xml": model_description(model, token).encode(),
-        **{f"sources/{name}": content for name, content in sources.items()},
-        **binaries_of(IDENTIFIER, sources),
-        **{f"{EXTRA}/{name}": content for name, content in extra.items()},
-        f"{EXTRA}/manifest.json": (json.dumps(manifest, indent=2) + "\n").encode(),
-    })  # fmt: skip
-    return {f"{IDENTIFIER}.fmu": made}
+    plant = plant_of(settings.get("plant", ""), compensator)
+    models = [compensator_model(compensator), *([plant_model(plant, compensator)] if plant is not None else [])]
+    return {f"{model.identifier}.fmu": _fmu(model, compensator, origin) for model in models}
+
+
+def note_of(compensator: Compensator, settings: Mapping[str, str]) -> str:
+    """Return how to have an FMU of the plant too; empty where there is one, or can't be one."""
+    if settings.get("plant") or compensator.current_drive is not None:
+        return ""
+    return "no FMU of the plant is made; for one, give --plant PLANT.toml, such as demo/example/plant.toml"
 
 
 @cache
@@ -143,6 +130,33 @@ def made_by_another_compiler(files: Mapping[str, bytes]) -> str:
         if found != this and isinstance(found, str):
             return f"{name} was made with {quoted(found)}, and here is {this}"
     return ""
+
+
+def _fmu(model: Model, compensator: Compensator, origin: FirmwareOrigin) -> bytes:
+    """Return one FMU."""
+    digest = origin.compensator_json
+    # What ties a binary to its modelDescription.xml.
+    made_from = (digest, model.identifier, model.variables, sorted(model.extra.items()), TOOL)
+    token = f"{{{uuid.UUID(sha256_of(repr(made_from).encode())[:32])}}}"
+    values = {
+        **model.values,
+        "banner": banner_of(compensator, digest).lines("dz_fmu.c.jinja"),
+        "title": model.title.replace("dzdesign ", "").capitalize(),
+        "token": token,
+        "exchange": model.exchange,
+        "variables": model.variables,
+        "model_template": model.template,
+    }
+    template = strict_templates("dzdesign.codegen.fmu", autoescape=False).get_template("dz_fmu.c.jinja")
+    sources = {SOURCE: str(template.render(values)).encode(), **model.core, **_headers()}
+    manifest = {"schema": SCHEMA, "tool": TOOL, "made_with": made_with(), "compensator_json": digest, "token": token}
+    return archive({
+        "modelDescription.xml": model_description(model, token).encode(),
+        **{f"sources/{name}": content for name, content in sources.items()},
+        **binaries_of(model.identifier, sources),
+        **{f"{EXTRA}/{name}": content for name, content in model.extra.items()},
+        f"{EXTRA}/manifest.json": (json.dumps(manifest, indent=2) + "\n").encode(),
+    })  # fmt: skip
 
 
 def _headers() -> dict[str, bytes]:

@@ -1,8 +1,11 @@
-"""The compensator's FMU as a model: its variables, and what its template prints.
+"""The two FMUs as models: their variables, and what their templates print.
 
-Its core is word for word that of the firmware.
+The compensator's core is word for word that of the firmware. The plant is amplifier, coil, spool and edge by Eqs.
+(19)-(24), with parameters that the importer may change; `verify` simulates the same equations in a text of its own, and
+this one stands in ``templates/plant.c.jinja``.
 """
 
+import json
 from collections.abc import Mapping
 from typing import Any
 
@@ -10,12 +13,39 @@ from dzdesign.codegen.calibration.files import core_headers, core_sources
 from dzdesign.codegen.fmu.description import Causality, Kind, Model, Variable
 from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_types import to_json_bytes
+from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 
+#: Of a default experiment, s.
+STOP_S, PLANT_STOP_S = 10.0, 1.0
 #: The library for a PC: it takes the scalings of any compensator.
 TARGET = "host"
 #: Of the core's 16 bits; beyond the converter's own none is valid.
 LARGEST_CODE = 65535.0
+#: Pressures of a bench, MPa: where nothing is set, the spring alone would hold the valve at no pressure drop.
+SUPPLY_MPA, BACK_MPA = 1.0, 1.0
+#: Unit and meaning of each parameter of the plant, by its name in plant.toml.
+PARAMETERS: Mapping[str, tuple[str, str]] = {
+    "u_max_V": ("V", "Command at which the PWM is fully on."),
+    "K_a": ("", "Amplifier gain, Eq. (19)."),
+    "K_fi_V_A": ("V/A", "Current feedback, Eq. (21)."),
+    "R_c_ohm": ("ohm", "Resistance of the coil, Eq. (20)."),
+    "r_p_ohm": ("ohm", "Internal resistance of the amplifier, Eq. (20)."),
+    "L_c_H": ("H", "Inductance of the coil, Eq. (20)."),
+    "K_i_N_A": ("N/A", "Force of the solenoid per current, Eq. (22)."),
+    "m_e_kg": ("kg", "Moving mass, Eq. (23)."),
+    "B_e_N_s_m": ("N s/m", "Damping, Eq. (23)."),
+    "K_et_N_m": ("N/m", "Spring, Eq. (23)."),
+    "preload_N": ("N", "Load force at rest."),
+    "pressure_force_N_MPa": ("N/MPa", "By how much it falls with the pressure drop."),
+    "flow_force_N_mm_MPa": ("N/(mm MPa)", "By how much it grows with pressure drop and opening."),
+    "overlap_mm": ("mm", "Travel before the edge opens."),
+    "stroke_mm": ("mm", "Travel to the stop."),
+    "hysteresis_V": ("V", "Play between current and force, as command."),
+    "C_d_W_mm": ("mm", "Discharge coefficient times area gradient, Eq. (24)."),
+    "rho_kg_m3": ("kg/m3", "Density, Eq. (24)."),
+    "droop_MPa_L_min2": ("MPa/(L/min)^2", "Pressure drop lost per flow squared."),
+}
 
 
 def compensator_model(compensator: Compensator) -> Model:
@@ -23,13 +53,18 @@ def compensator_model(compensator: Compensator) -> Model:
     made = generate(compensator, TARGET).files
     names = (*core_headers(block=False, current=False), *core_sources(block=False, current=False))
     return Model(
+        identifier="dz_compensator",
+        title="dzdesign compensator",
         description=f"Dead-zone compensator of a proportional valve, law {compensator.law}: the firmware's integers.",
         variables=_compensator_variables(compensator),
+        exchange=True,
         step_s=1 / compensator.signals.tick_Hz,
+        stop_s=STOP_S,
         units=compensator.valve.recorded_units,
+        template="compensator.c.jinja",
         values=_compensator_values(compensator),
         core={name: made[f"core/{name}"].encode() for name in names},
-        document=to_json_bytes(compensator),
+        extra={Compensator.FILE_NAME: to_json_bytes(compensator)},
     )
 
 
@@ -123,3 +158,58 @@ def _compensator_values(compensator: Compensator) -> Mapping[str, object]:
         "b_zero": b.zero_code,
         "b_codes": per_MPa(b.zero_code, b.full_code, float(b.span_MPa)),
     }
+
+
+def plant_of(text: str, compensator: Compensator) -> Mapping[str, float] | None:
+    """Return the plant of a setting, JSON of its parameters; None of an empty one.
+
+    A plant behind a current controller is an `InputError`: its FMU takes the compare value as a duty.
+    """
+    if not text:
+        return None
+    if compensator.current_drive is not None:
+        raise InputError(
+            "--plant: the compensator controls the current, and the plant's FMU takes a duty; leave --plant out"
+        )
+    try:
+        found = json.loads(text)
+        plant = {name: float(found[name]) for name in PARAMETERS}
+    except (ValueError, TypeError, KeyError) as error:
+        raise InputError(f"the setting plant is no plant of {len(PARAMETERS)} parameters: {error}") from error
+    if set(found) != set(PARAMETERS):
+        raise InputError(f"the setting plant has other parameters: {', '.join(sorted(set(found) - set(PARAMETERS)))}")
+    return plant
+
+
+def plant_model(plant: Mapping[str, float], compensator: Compensator) -> Model:
+    """Return what the FMU is called, and its variables."""
+    table, signals = _Table(), compensator.signals
+    add = table.add
+    add("compare", f"PWM compare value, of {signals.compare_max}.", "input", kind="integer", start=0.0,
+        range=(0.0, 65535.0))  # fmt: skip
+    add("voltage", "Voltage at the amplifier's input, added to that of the PWM.", "input", unit="V", start=0.0)
+    add("supply", "Pressure drop at no flow.", "input", unit="MPa", start=SUPPLY_MPA)
+    add("back_pressure", "Pressure behind the edge.", "input", unit="MPa", start=BACK_MPA)
+    for name, (unit, description) in PARAMETERS.items():
+        add(name, description, "parameter", unit=unit, start=float(plant[name]))
+    add("i", "Current of the coil.", "output", unit="A")
+    add("x", "Position of the spool.", "output", unit="m")
+    add("v", "Speed of the spool.", "output", unit="m/s")
+    add("Q", "Flow.", "output", unit="L/min")
+    add("dP", "Pressure drop over the edge.", "output", unit="MPa")
+    add("p_ahead", "Pressure ahead of the edge.", "output", unit="MPa")
+    add("p_behind", "Pressure behind the edge.", "output", unit="MPa")
+    add("at_stop", "-1: the spool is held at its closed end, 1: at its open end, 0: it is free.", "output",
+        kind="integer")  # fmt: skip
+    return Model(
+        identifier="dz_plant",
+        title="dzdesign plant",
+        description="Proportional valve by Eqs. (19)-(24): amplifier, coil, spool with stops and play, metering edge.",
+        variables=tuple(table.variables),
+        step_s=1 / signals.tick_Hz,
+        stop_s=PLANT_STOP_S,
+        units=compensator.valve.recorded_units,
+        template="plant.c.jinja",
+        values={"tick_Hz": signals.tick_Hz, "compare_max": signals.compare_max},
+        extra={"plant.json": (json.dumps(dict(plant), indent=2) + "\n").encode()},
+    )

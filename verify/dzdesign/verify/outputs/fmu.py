@@ -1,5 +1,7 @@
-"""`checks` of a folder with an FMU, by FMPy: valid, every input, the drive by both interfaces, V and MPa."""
+"""`checks` of a folder of FMUs, by FMPy: valid, every input, the drive by both interfaces, V and MPa, closed loop."""
 
+import json
+import shutil
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -11,17 +13,20 @@ from pathlib import Path
 import numpy as np
 
 from dzdesign.core.artefact_files import sha256_of
-from dzdesign.core.errors import RequirementError, and_more
+from dzdesign.core.errors import InputError, RequirementError, and_more
 from dzdesign.core.scratch import scratch_folder
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import OutputManifest
 from dzdesign.verify import requirements
+from dzdesign.verify.closed_loop.loop import BENCH_BACK_MPA, ClosedLoop
+from dzdesign.verify.closed_loop.plant import Plant
 from dzdesign.verify.evidence import OutputChecks, TriedInputs
 from dzdesign.verify.exhaustive.all_inputs import input_check, input_checks
 from dzdesign.verify.exhaustive.drive_check import drive_samples
 from dzdesign.verify.exhaustive.exact_drive import DriveModel
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import PreparedInputs
+from dzdesign.verify.loop_results import Side
 from dzdesign.verify.outputs.fmu_importer import binary_here, run_in_child
 from dzdesign.verify.requirements import Check
 from dzdesign.verify.toolchain.compiled_core import ENDINGS, CompiledCore
@@ -29,7 +34,7 @@ from dzdesign.verify.toolchain.machines import HOST, Machine, stored
 
 Say = Callable[[str], None]
 INSTALL = 'FMPy, which runs FMUs, is not installed; run `pip install "fmpy>=0.3.20,<0.4"`'
-COMPENSATOR = "dz_compensator"
+COMPENSATOR, PLANT = "dz_compensator", "dz_plant"
 #: Of the drive: samples and their seed; of V and MPa: rows.
 DRIVE_SAMPLES, SEED, PHYSICAL_ROWS = 3000, 25, 4000
 #: Of a code, as near its border as this the rounding of a double decides.
@@ -37,6 +42,12 @@ AT_BORDER = Fraction(1, 10**6)
 CODES, VALUES = ("u_i_code", "p_A_code", "p_B_code"), ("u_i", "p_A", "p_B")
 #: Loads a binary by itself: of Windows without flags.
 FMU_HOST = replace(HOST, link_flags=("-ldl",) if sys.platform.startswith("linux") else (), run_timeout_s=300.0)
+#: Of the closed loop: share of the largest flow that is allowed, and the command over time: rest, up, full, down, rest,
+#: then steps; s and shares of full command.
+TOLERANCE = 1e-4
+COURSE = ((0.0, 0.0), (0.1, 0.0), (0.5, 1.0), (0.55, 1.0), (0.9, 0.0), (1.0, 0.0), (1.0, 0.5), (1.1, 0.5),
+          (1.1, 0.02), (1.2, 0.02), (1.2, 1.0), (1.3, 0.0), (1.4, 0.0))  # fmt: skip
+SIDES: Mapping[int, Side] = {1: "positive", -1: "negative"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,26 +63,43 @@ class Unpacked:
     problems: tuple[str, ...]
 
 
-def checks(folder: Path, _: OutputManifest, compensator: Compensator, say: Say) -> OutputChecks:
-    """Check the FMU in a folder; of its binaries that of this machine is run.
+def checks(folder: Path, manifest: OutputManifest, compensator: Compensator, say: Say) -> OutputChecks:
+    """Check the FMUs in a folder; of their binaries that of this machine is run.
 
-    On a machine that the FMU has no binary for, and without FMPy, what would run is not checked.
+    On a machine that the FMUs have no binary for, and without FMPy, what would run is not checked.
     """
+    plant = plant_of(manifest)
     if find_spec("fmpy") is None:
         return OutputChecks(checks=(requirements.FMU_VALID.check(holds=None, text=INSTALL),), inputs=())
     with scratch_folder() as place:
-        fmu = unpacked(folder / f"{COMPENSATOR}.fmu", place)
-        text = f"{fmu.name}: {and_more(fmu.problems, 3)}" if fmu.problems else f"{fmu.name}, 0 problems"
-        valid = requirements.FMU_VALID.check(holds=not fmu.problems, text=text)
-        if fmu.problems:
+        fmus = [unpacked(folder / f"{name}.fmu", place) for name in ((COMPENSATOR, PLANT) if plant else (COMPENSATOR,))]
+        problems = [f"{fmu.name}: {problem}" for fmu in fmus for problem in fmu.problems]
+        text = and_more(problems, 3) if problems else f"{len(fmus)} FMUs, 0 problems"
+        valid = requirements.FMU_VALID.check(holds=not problems, text=text)
+        if problems:
             return OutputChecks(checks=(valid,), inputs=())
-        if fmu.binary is None:
+        if any(fmu.binary is None for fmu in fmus):
             text = "there is no binary for this machine; verify on Linux, on x86_64 Windows, or on macOS"
             return OutputChecks(checks=(valid, requirements.EXACT_LAW.check(holds=None, text=text)), inputs=())
-        say(f"trying every input of {fmu.name}")
-        found, tried = input_results(fmu, compensator)
-        found += [drive_check(fmu, compensator), physical_check(fmu, compensator)]
+        say(f"trying every input of {fmus[0].name}")
+        found, tried = input_results(fmus[0], compensator)
+        found += [drive_check(fmus[0], compensator), physical_check(fmus[0], compensator)]
+        for plant_fmu in fmus[1:]:
+            say(f"running {fmus[0].name} with {plant_fmu.name}")
+            found.append(closed_loop_check(fmus[0], plant_fmu, Plant(**plant), compensator))
     return OutputChecks(checks=(valid, *found), inputs=tuple(tried))
+
+
+def plant_of(manifest: OutputManifest) -> dict[str, float]:
+    """Return the parameters of the plant that the FMUs were made with; empty without one."""
+    text = manifest.settings.get("plant", "")
+    try:
+        plant = {str(name): float(value) for name, value in (json.loads(text) if text else {}).items()}
+        if plant:
+            Plant(**plant)
+    except (ValueError, AttributeError, TypeError, InputError) as error:
+        raise InputError(f"the manifest's setting plant is no plant: {error}; make the FMUs again") from error
+    return plant
 
 
 def unpacked(path: Path, place: Path) -> Unpacked:
@@ -84,7 +112,7 @@ def unpacked(path: Path, place: Path) -> Unpacked:
         problems = tuple(validate_fmu(str(path)))
         fmpy.extract(str(path), str(folder))
         described = fmpy.read_model_description(str(folder))
-        if described.modelExchange is None:
+        if path.stem == COMPENSATOR and described.modelExchange is None:
             problems += ("it offers no Model Exchange",)
         guid, identifier = described.guid, described.coSimulation.modelIdentifier
         references = {each.name: each.valueReference for each in described.modelVariables}
@@ -240,3 +268,37 @@ def _codes(compensator: Compensator, row: list[float]) -> tuple[int, int, int] |
         return None
     command_code, p_a, p_b = (min(max(floor(each), 0), signals.code_max) for each in exact)
     return command_code, p_a, p_b
+
+
+def closed_loop_check(fmu: Unpacked, plant_fmu: Unpacked, plant: Plant, compensator: Compensator) -> Check:
+    """Compare the flow of the coupled FMUs with that of `verify`'s own loop, at the least and largest tested drop."""
+    signals, worst, periods = compensator.signals, 0.0, 0
+    times, corners = np.arange(0, COURSE[-1][0], 1 / signals.tick_Hz), np.array(COURSE)
+    share = np.interp(times, corners[:, 0], corners[:, 1])
+    try:
+        with scratch_folder() as firmware:
+            # The core that the FMU carries as sources, where a closed loop finds it.
+            shutil.copytree(fmu.folder / "sources", firmware / "core")
+            for sign in signals.signs:
+                loop = ClosedLoop(plant, firmware, compensator, sign)
+                tests = compensator.valve.sides[SIDES[sign]].tests
+                drops = [test.dp_MPa for test in tests if test.dp_MPa is not None] or [1.0]
+                for drop_MPa in sorted({min(drops), max(drops)}):
+                    back_MPa = loop.back_within_span(BENCH_BACK_MPA, drop_MPa)
+                    run = loop.run(share, drop_MPa, "compensated", back_MPa=back_MPa, periods_per_record=1)
+                    swapped = sign < 0 and signals.swapped
+                    found = np.array(run_in_child(
+                        "coupled", f"{fmu.name} with {plant_fmu.name}", compensator=str(fmu.folder),
+                        plant=str(plant_fmu.folder), drop_MPa=drop_MPa, back_MPa=back_MPa, step_s=1 / signals.tick_Hz,
+                        command_V=(sign * share * float(compensator.u_max_V)).tolist(),
+                        drive="compare_b" if sign < 0 else "compare_a",
+                        pressures=("p_B", "p_A") if swapped else ("p_A", "p_B"),
+                    ))  # fmt: skip
+                    if (largest := float(run.q_L_min.max())) <= 0:
+                        raise RequirementError(f"the same plant lets no flow pass at {drop_MPa:g} MPa")
+                    worst = max(worst, float(np.abs(found[:, 0] - run.q_L_min).max()) / largest)
+                    periods += share.size
+    except RequirementError as error:
+        return requirements.FMU_CLOSED_LOOP.check(holds=False, text=str(error))
+    words = f"{periods} PWM periods, flows differ by at most {worst:.2g} of the largest; {TOLERANCE:g} is allowed"
+    return requirements.FMU_CLOSED_LOOP.check(holds=worst <= TOLERANCE, text=words)

@@ -37,7 +37,7 @@ def binary_here(folder: Path, identifier: str) -> Path | None:
 class Importer:
     """An instance of an unpacked FMU for one kind of interface, from time 0 on."""
 
-    def __init__(self, folder: str, *, exchange: bool, codes: bool) -> None:
+    def __init__(self, folder: str, *, exchange: bool, **before: float) -> None:
         from fmpy import read_model_description
         from fmpy.fmi2 import FMU2Model, FMU2Slave
 
@@ -52,7 +52,7 @@ class Importer:
             libraryPath=str(binary_here(Path(folder), interface.modelIdentifier)),
         )
         self.fmu.instantiate()
-        self.give(codes=codes)
+        self.give(**before)
         self.fmu.setupExperiment(startTime=0.0)
         self.fmu.enterInitializationMode()
         self.fmu.exitInitializationMode()
@@ -91,6 +91,24 @@ def stepped(
         else:
             one.fmu.doStep(index * step_s, step_s)
             found.append(one.get(outputs))
+    return found
+
+
+def coupled(
+    compensator: str, plant: str, command_V: Row, drop_MPa: float, back_MPa: float, step_s: float, drive: str,
+    pressures: list[str],
+) -> list[Row]:  # fmt: skip
+    """Return flow in L/min and compare value after each step of both, each given what the other had before it."""
+    law = Importer(compensator, exchange=False)
+    valve = Importer(plant, exchange=False, supply=drop_MPa, back_pressure=back_MPa)
+    compare, found = 0.0, []
+    for index, volts in enumerate(command_V):
+        law.give(u_i=volts, **dict(zip(pressures, valve.get(("p_ahead", "p_behind")), strict=True)))
+        valve.give(compare=compare)
+        for each in (law, valve):
+            each.fmu.doStep(index * step_s, step_s)
+        (compare,) = law.get((drive,))
+        found.append([*valve.get(("Q",)), compare])
     return found
 
 

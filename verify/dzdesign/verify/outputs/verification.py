@@ -60,7 +60,7 @@ OF_TEXTS = (
     requirements.EXACT_LAW, requirements.FALLBACK, requirements.STATES, requirements.OVERFLOW,
     requirements.ZERO_COMMAND,
 )  # fmt: skip
-OF_FMUS = (requirements.FMU_DRIVE, requirements.FMU_UNITS)
+OF_FMUS = (requirements.FMU_DRIVE, requirements.FMU_UNITS, requirements.FMU_CLOSED_LOOP)
 OF_AMPLIFIERS = (requirements.READ_BACK, requirements.SAFE, requirements.DEAD_ZONES, requirements.LAW_DEAD_ZONES)
 #: Target, as the manifest names it, to what its checks are of, and the checks.
 KINDS = {
