@@ -15,7 +15,7 @@ from scoreboard import Row, print_rows, say
 from two_forms import AROUND, TwoForms, block_as_c, two_forms
 
 from dzdesign.codegen.calibration.block import block_of, built_for, current_block
-from dzdesign.codegen.calibration.files import block_core_files, texts
+from dzdesign.codegen.calibration.files import block_core_files
 from dzdesign.codegen.calibration.layout import CalibrationBlock
 from dzdesign.codegen.calibration.packing import pack
 from dzdesign.design.compensator import Compensator
@@ -26,6 +26,7 @@ from dzdesign.verify.current.current_checks import read_controller
 from dzdesign.verify.exhaustive.drive_check import CompiledDrive, PreparedDrive
 from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4, HOST, Machine
 from tests.support.block_cores import block_folder
+from tests.support.core_texts import texts
 from tests.support.current_loops import LOOPS, current_texts
 
 PROGRAM = "block_sequences.c"

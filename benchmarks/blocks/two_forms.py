@@ -10,7 +10,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[2]))  # for the valve and options that the tests share
 
 from dzdesign.codegen.calibration.block import block_of, built_for
-from dzdesign.codegen.calibration.files import block_core_files, texts
+from dzdesign.codegen.calibration.files import block_core_files
 from dzdesign.codegen.calibration.layout import NODE_MASK
 from dzdesign.codegen.calibration.packing import pack
 from dzdesign.codegen.project import generate, target_named
@@ -25,6 +25,7 @@ from dzdesign.identify.reading.ramp_files import read_ramp_file
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.toolchain.machines import Machine
 from tests.codegen.test_current_control import MEASURED
+from tests.support.core_texts import texts
 from tests.support.golden_firmware import FULL, full_options
 
 SHARED = Path(os.environ.get("DZDESIGN_SHARED_DATA", Path(__file__).parents[3] / "shared" / "data"))

@@ -69,7 +69,7 @@ class DrivenLine:
 def _loading(data: bytes) -> None:
     for act in (
         lambda session: session.query(),
-        lambda session: session.load(_block(), 1, 2),
+        lambda session: list(session.loading(_block(), 1, 2)),
         lambda session: session.abort(),
     ):
         try:

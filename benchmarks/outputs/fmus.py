@@ -13,8 +13,9 @@ from time import perf_counter
 from example_valve import example_valve
 from scoreboard import Row, print_rows, say
 
-from dzdesign.codegen.other_targets import generate_output, write_output
+from dzdesign.codegen.other_targets import generate_output
 from dzdesign.codegen.project import target_named
+from dzdesign.codegen.writing import write_generated
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
 from dzdesign.design.options import options_of
@@ -38,7 +39,7 @@ def print_fmus(quick: bool = False, seed: int = 0) -> list[Row]:
         begin = perf_counter()
         first, again = (generate_output(compensator, "fmu", {"plant": plant}) for _ in range(2))
         seconds = (perf_counter() - begin) / 2
-        write_output(first, folder)
+        write_generated(first, folder)
         differing = sum(first.files[name] != again.files[name] for name in first.files)
         rows = [Row(what="FMUs that differ when made again", value=differing, limit=0, note=f"{seconds:.0f} s for all")]
         rows += _checked(folder, compensator)

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from dzdesign.codegen.calibration.acceptance import refusals
-from dzdesign.codegen.calibration.files import FINDINGS, block_core_files, texts
+from dzdesign.codegen.calibration.files import FINDINGS, block_core_files
 from dzdesign.codegen.calibration.packing import pack
 from dzdesign.core.errors import RequirementError
 from tests.support.c_library import load_library
 from tests.support.core_mutants import Mutant, mutants_of
+from tests.support.core_texts import texts
 
 CHECK = "dz_calibration.c"
 BITS = {name: 1 << place for place, name in enumerate(FINDINGS)}

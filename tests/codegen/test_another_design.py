@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from dzdesign.codegen.earlier_firmware import refuse_another_design
-from dzdesign.codegen.project import generate, write_firmware
+from dzdesign.codegen.project import generate
+from dzdesign.codegen.writing import write_generated
 from dzdesign.command_line.cli import main
 from dzdesign.core import artefact_files
 from dzdesign.core.artefact_files import to_json
@@ -70,39 +70,39 @@ def test_another_option_is_named(valve_file, codegen, tmp_path):
 
 
 def test_another_valve_is_named(example_compensator, tmp_path):
-    write_firmware(generate(example_compensator, "host"), tmp_path / "firmware")
+    write_generated(generate(example_compensator, "host"), tmp_path / "firmware")
     other = replace(example_compensator.valve, made_from=example_compensator.valve.made_from[:2])
     with pytest.raises(InputError, match="its valve is another one"):
-        refuse_another_design(tmp_path / "firmware", replace(example_compensator, valve=other))
+        write_generated(generate(replace(example_compensator, valve=other), "host"), tmp_path / "firmware")
 
 
 def test_other_numbers_of_the_same_options_are_another_design(example_compensator, tmp_path):
-    write_firmware(generate(example_compensator, "host"), tmp_path / "firmware")
+    write_generated(generate(example_compensator, "host"), tmp_path / "firmware")
     beta = tuple(max(value - 1, 1) for value in example_compensator.positive.beta)
-    with pytest.raises(InputError, match="other numbers"):
-        write_firmware(generate(with_side(example_compensator, beta=beta), "host"), tmp_path / "firmware")
+    with pytest.raises(InputError, match="its sides is another"):
+        write_generated(generate(with_side(example_compensator, beta=beta), "host"), tmp_path / "firmware")
 
 
 def test_the_same_design_is_written_again_also_of_another_version_and_for_another_target(example_compensator, tmp_path):
     firmware = generate(example_compensator, "host")
-    write_firmware(firmware, tmp_path / "firmware")
-    write_firmware(firmware, tmp_path / "firmware")
+    write_generated(firmware, tmp_path / "firmware")
+    write_generated(firmware, tmp_path / "firmware")
     older = json.loads(to_json_bytes(example_compensator))
     older["tool"]["version"] = "0.0.9"
     older = read_artefact(to_json(older).encode(), Compensator, "compensator.json")
-    write_firmware(generate(older, "host"), tmp_path / "older")
-    write_firmware(firmware, tmp_path / "older")
-    note = write_firmware(generate(example_compensator, "cortex-m4"), tmp_path / "older").note
-    assert "was replaced by this one for cortex-m4" in note
+    write_generated(generate(older, "host"), tmp_path / "older")
+    write_generated(firmware, tmp_path / "older")
+    note = write_generated(generate(example_compensator, "cortex-m4"), tmp_path / "older").note
+    assert "was replaced by this for cortex-m4" in note
 
 
 def test_a_firmware_whose_compensator_is_gone_is_not_written_over(example_compensator, tmp_path):
     firmware = generate(example_compensator, "host")
-    write_firmware(firmware, tmp_path / "firmware")
+    write_generated(firmware, tmp_path / "firmware")
     (tmp_path / "firmware/compensator.json").unlink()
     with pytest.raises(InputError, match="can't be read"):
-        write_firmware(firmware, tmp_path / "firmware")
-    write_firmware(firmware, tmp_path / "firmware", over_another=True)
+        write_generated(firmware, tmp_path / "firmware")
+    write_generated(firmware, tmp_path / "firmware", over_another=True)
     assert (tmp_path / "firmware/compensator.json").is_file()
 
 
@@ -110,8 +110,8 @@ def test_of_two_at_once_the_later_one_does_not_go_over_the_other(example_compens
     """Between the look into the folder and the writing another process writes its design there."""
     folder, ours = tmp_path / "firmware", generate(example_compensator, "host")
     other = replace(example_compensator, valve=replace(example_compensator.valve, record={"serial": "another"}))
-    theirs = write_firmware(generate(other, "host"), tmp_path / "theirs")
+    theirs = write_generated(generate(other, "host"), tmp_path / "theirs")
     monkeypatch.setattr(artefact_files, "bring_back", lambda _: (tmp_path / "theirs").rename(folder))
-    with pytest.raises(InputError, match="holds the firmware of another design"):
-        write_firmware(ours, folder)
+    with pytest.raises(InputError, match="holds another firmware"):
+        write_generated(ours, folder)
     assert json.loads((folder / "manifest.json").read_text())["files"] == dict(theirs.manifest.files)

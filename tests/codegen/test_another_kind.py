@@ -4,7 +4,8 @@ import pytest
 
 from dzdesign import api
 from dzdesign.codegen.fmu.files import note_of
-from dzdesign.codegen.other_targets import generate_output, settings_of, write_output
+from dzdesign.codegen.other_targets import generate_output, settings_of
+from dzdesign.codegen.writing import write_generated
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_types import to_json_bytes
 from tests.support.paths import GOLDENS
@@ -20,7 +21,7 @@ def run(tmp_path, monkeypatch, compensator):
     """Return what runs `codegen` in a folder with a function block in plc."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "compensator.json").write_bytes(to_json_bytes(compensator))
-    write_output(generate_output(compensator, "iec61131", settings_of("iec61131", {})), tmp_path / "plc")
+    write_generated(generate_output(compensator, "iec61131", settings_of("iec61131", {})), tmp_path / "plc")
     return lambda *words: main(["codegen", "compensator.json", "--target", *words, "-o", "plc"])
 
 
@@ -39,7 +40,7 @@ def test_another_kind_of_output_is_left_as_it_is(run, words, tmp_path, capsys, w
 def test_with_replace_it_is_written_over_and_said(run, tmp_path, capsys):
     assert run("matlab", "--replace") == 0
     assert not (tmp_path / "plc" / "FB_DeadZone.st").exists() and (tmp_path / "plc" / "dz_comp.m").is_file()
-    assert "the iec61131 output in 'plc' was replaced by this matlab" in capsys.readouterr().err
+    assert "what 'plc' held for iec61131 was replaced by this for matlab" in capsys.readouterr().err
 
 
 def test_the_same_kind_with_other_settings_is_written_again(run, tmp_path):

@@ -8,7 +8,8 @@ import subprocess
 import pytest
 
 from dzdesign import api
-from dzdesign.codegen.project import generate, targets, write_firmware
+from dzdesign.codegen.project import generate, targets
+from dzdesign.codegen.writing import write_generated
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import MANIFEST_NAME, to_json, write_folder
 from dzdesign.core.artefact_types import to_json_bytes
@@ -38,7 +39,7 @@ def compensator(example_valve):
 
 @pytest.fixture
 def cortex(compensator, tmp_path):
-    write_firmware(generate(compensator, "cortex-m4"), tmp_path / "firmware")
+    write_generated(generate(compensator, "cortex-m4"), tmp_path / "firmware")
     return tmp_path / "firmware"
 
 
@@ -122,14 +123,14 @@ def test_any_other_file_that_was_changed_is_not_overwritten(compensator, cortex,
     (cortex / name).write_text(text.replace("1.0.0", "1.0.1", 1) + "\n")
     before = {path: path.read_bytes() for path in cortex.rglob("*") if path.is_file()}
     with wording.refusal(InputError):
-        write_firmware(generate(compensator, "cortex-m4"), cortex)
+        write_generated(generate(compensator, "cortex-m4"), cortex)
     assert before == {path: path.read_bytes() for path in cortex.rglob("*") if path.is_file()}
 
 
 def test_what_was_filled_in_is_not_lost_to_another_target(compensator, cortex, wording):
     fill_in(cortex)
     with wording.refusal(InputError):
-        write_firmware(generate(compensator, "host"), cortex)
+        write_generated(generate(compensator, "host"), cortex)
     assert "return 7u;" in (cortex / "cortex_m4/dz_board.c").read_text()
 
 
@@ -159,7 +160,7 @@ def test_a_link_in_its_place_stays_a_link(compensator, cortex, tmp_path):
     mine.write_text("/* mine */\n")
     (cortex / "cortex_m4/dz_board.c").unlink()
     (cortex / "cortex_m4/dz_board.c").symlink_to(mine)
-    write_firmware(generate(compensator, "cortex-m4"), cortex)
+    write_generated(generate(compensator, "cortex-m4"), cortex)
     assert (cortex / "cortex_m4/dz_board.c").is_symlink() and mine.read_text() == "/* mine */\n"
 
 
@@ -240,7 +241,7 @@ def test_a_vendors_header_is_named_and_found_by_an_option(cortex, tmp_path, caps
 def test_include_of_what_is_no_folder_or_not_compiled_here_is_refused(compensator, cortex, tmp_path, wording):
     with wording.refusal(InputError):
         api.verify(cortex, include=[tmp_path / "nowhere"])
-    write_firmware(generate(compensator, "f28335"), tmp_path / "other")
+    write_generated(generate(compensator, "f28335"), tmp_path / "other")
     with wording.refusal(InputError):
         api.verify(tmp_path / "other", include=[tmp_path])
 
@@ -257,7 +258,7 @@ def test_files_in_the_folder_for_them_are_named_kept_and_not_checked(compensator
     wording.of_test(check.text)
     found = user_files(cortex, read_firmware_manifest(cortex).files)
     assert sorted(found) == ["board/adc.c", "board/my_chip.ld"]
-    write_firmware(generate(compensator, "cortex-m4"), cortex)
+    write_generated(generate(compensator, "cortex-m4"), cortex)
     assert (cortex / "board/adc.c").read_text() == "this is no C"
     evidence = evidence_with(user_files=("board/adc.c",))
     assert "board/adc.c, which is yours: review it, and try it on the machine" in not_tried(evidence)
@@ -320,7 +321,7 @@ def test_verify_holds_and_says_that_it_was_not_checked(cortex, tmp_path):
 
 
 def test_a_project_file_of_code_composer_studio_is_the_users(compensator, tmp_path, wording):
-    write_firmware(generate(compensator, "f28335"), tmp_path)
+    write_generated(generate(compensator, "f28335"), tmp_path)
     fill_in(tmp_path, PROJECT, "C:/ti/c2000", "D:/ti/c2000")
     check = unchanged(tmp_path)
     assert check.holds

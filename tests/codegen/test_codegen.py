@@ -7,7 +7,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from dzdesign.codegen.core.integer_form import integer_form
+from dzdesign.codegen.calibration.block import numbers_of
+from dzdesign.codegen.core.integer_form import exact_reciprocal, integer_form
 from dzdesign.codegen.project import generate
 from dzdesign.core.errors import InputError
 from dzdesign.design.side_design import finest_units
@@ -33,8 +34,7 @@ def evaluate(form, compensator, command: int, dp_code: int) -> int:
     if codes:
         total -= (between(form.table) - between(form.zero_table)) * form.transition * (codes - reached)
     assert total >= 0
-    quotient = min(total >> form.shift, form.largest)
-    return quotient // form.divisor
+    return min((total >> form.shift) // form.divisor, compensator.drive_functions.compare_limit)
 
 
 def random_compensators(base, count: int, seed: int):
@@ -99,15 +99,11 @@ def test_whatever_units_design_takes_the_firmware_can_count_in(example_compensat
 
 @pytest.mark.slow
 def test_reciprocal_is_exact_for_every_quotient_that_can_occur(example_compensator):
-    form = integer_form(example_compensator)
-    quotients = np.arange(0, 2 * 60000 * form.divisor, dtype=np.uint64)
-    by_product = (quotients * np.uint64(form.reciprocal)) >> np.uint64(form.reciprocal_shift)
-    assert np.array_equal(by_product, quotients // np.uint64(form.divisor))
-
-
-def test_same_input_same_bytes(example_compensator, example_firmware):
-    again = generate(example_compensator, "f28335")
-    assert dict(again.files) == dict(example_firmware.files)
+    divisor = integer_form(example_compensator).divisor
+    quotients = np.arange(0, 2 * 60000 * divisor, dtype=np.uint64)
+    reciprocal, shift = exact_reciprocal(divisor, quotients.size - 1)
+    by_product = (quotients * np.uint64(reciprocal)) >> np.uint64(shift)
+    assert np.array_equal(by_product, quotients // np.uint64(divisor))
 
 
 def test_core_has_no_floating_point_no_division_and_no_state(example_firmware):
@@ -132,7 +128,7 @@ def test_scalings_too_rich_for_the_integers_are_refused(example_compensator, wor
         u_min0_over_u_max=Fraction(7, 10**9 + 7),
     )
     with wording.refusal(InputError):
-        integer_form(awkward)
+        numbers_of(awkward)
 
 
 def test_a_law_whose_divisor_cancels_needs_no_reciprocal(example_compensator):

@@ -223,7 +223,6 @@ def place(tmp_path):
         board=(),
         origin=FirmwareOrigin(compensator_json=digest, valve_json=digest, ramp_tests=()),
         vectors=0,
-        constants=(),
         files={},
     )
     write_folder(tmp_path / "firmware", {"core/a.c": "int a;\n"}, manifest)

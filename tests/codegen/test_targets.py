@@ -172,6 +172,14 @@ def test_a_clock_that_does_not_divide_is_refused(monkeypatch, module, name, valu
         getattr(module, derived)()
 
 
+@pytest.mark.parametrize("name", ["signals", "banner"])
+def test_a_context_that_takes_a_name_of_the_renderer_is_refused(name, monkeypatch):
+    target = replace(target_named("host"), context={name: "none"})
+    monkeypatch.setattr(project, "target_named", lambda _: target)
+    with pytest.raises(DzdesignError, match=rf"{name}.* belong to the renderer"):
+        generate(golden_compensator("host"), "host")
+
+
 # --- names from users ---------------------------------------------------------------------------------------
 
 

@@ -170,23 +170,7 @@ def test_the_wiring_table_is_that_of_the_signals(firmware, target):
     assert not re.search(r"\bratio\b|sensor output 0-", text)
 
 
-def test_the_default_signals_are_the_whole_converter_and_live_zero_sensors(firmware):
-    for target, full, top in (("f28335", "3.000", "2.800"), ("f280049c", "3.300", "3.000")):
-        text = readme(firmware(target), target)
-        assert f"full = {full} V" in wiring_row(text, "command")
-        assert f"20 MPa = {top} V" in wiring_row(text, "pressure B")
-
-
-# --- both signs, dither, largest output -----------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("target", C2000)
-def test_both_outputs_are_tried_where_there_are_two(firmware, target):
-    text = readme(firmware(target, "--command-signal", BOTH, both=True), target)
-    assert [number for number in range(1, 8) if "GPIO2" in step(text, number)] == [1, 5, 6, 7]
-    assert "`dz_state.compare_b` / " in step(text, 5)
-    alone = power_up(readme(firmware(target), target))
-    assert "GPIO2" not in alone and "compare_b" not in alone and "zero window" not in alone
+# --- both signs -----------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("polarity", ["normal", "inverted"])
@@ -197,34 +181,6 @@ def test_the_ramp_through_the_zero_band_changes_pins_where_the_drive_does(firmwa
     window, zero = compensator.drive_functions.leave_zero_codes, compensator.signals.command.zero_code
     assert window == 41 + 3 + 3 + 1
     assert f"about zero, codes {zero - window} to {zero + window}" in step(readme(folder, "f28335"), 7)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("target", C2000)
-def test_a_dither_shows_in_the_compare_value(firmware, target):
-    folder = firmware(target, "--dither", "150 Hz 1 %")
-    counts = compensator_of(folder).drive_functions.dither_counts
-    assert f"{counts} counts above and {counts} below" in step(readme(folder, target), 3)
-    assert "dither" not in power_up(readme(firmware_again(folder, target), target))
-
-
-def firmware_again(folder: Path, target: str) -> Path:
-    """The same valve without options, beside it."""
-    other = folder.with_name("without")
-    assert main(["codegen", str(GOLDENS / "valve.json"), "--target", target, "-o", str(other)]) == 0
-    return other
-
-
-@pytest.mark.parametrize("target", C2000)
-def test_the_largest_output_is_the_limit(firmware, target):
-    folder = firmware(target, "--output-max", "90 %")
-    full = target_named(target).compare_max
-    limit = full * 9 // 10
-    text = readme(folder, target)
-    assert f"compare 0..{limit}" in text and f"compare 0..{full}" not in text
-    assert f"{limit} / {full}" in step(text, 7)
-    header = (folder / target / "dz_isr.h").read_text(encoding="utf-8")
-    assert f"last compare value, 0..{limit} " in header and f"0..{full}" not in header
 
 
 # --- the other targets, and the command line ------------------------------------------------------------------

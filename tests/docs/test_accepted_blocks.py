@@ -5,9 +5,10 @@ import inspect
 import re
 
 from dzdesign.codegen.calibration import acceptance
-from dzdesign.codegen.calibration.files import block_core_files, texts
+from dzdesign.codegen.calibration.files import block_core_files
 from dzdesign.codegen.calibration.layout import CalibrationBlock, CurrentBlock, SideBlock
 from tests.codegen.calibration.test_check import with_current
+from tests.support.core_texts import texts
 from tests.support.core_variants import variant
 from tests.support.paths import ROOT
 

@@ -5,8 +5,9 @@ import shutil
 
 import pytest
 
-from dzdesign.codegen.other_targets import generate_output, settings_of, write_output
-from dzdesign.codegen.project import generate, write_firmware
+from dzdesign.codegen.other_targets import generate_output, settings_of
+from dzdesign.codegen.project import generate
+from dzdesign.codegen.writing import write_generated
 from dzdesign.command_line.cli import main
 from dzdesign.core.errors import RequirementError
 from dzdesign.regeneration import generated_code, regenerated
@@ -24,10 +25,10 @@ def folder_of(example_compensator, tmp_path_factory):
     """The example's folder of each target, made once, to be copied."""
     root = tmp_path_factory.mktemp("seeded")
     for target in ("f28335", "cortex-m4", "host"):
-        write_firmware(generate(example_compensator, target, vectors=700 if target == "host" else 0), root / target)
-    write_firmware(generate(example_compensator, "host", "block"), root / "block")
+        write_generated(generate(example_compensator, target, vectors=700 if target == "host" else 0), root / target)
+    write_generated(generate(example_compensator, "host", "block"), root / "block")
     for target in ("iec61131", "matlab"):
-        write_output(generate_output(example_compensator, target, settings_of(target, {})), root / target)
+        write_generated(generate_output(example_compensator, target, settings_of(target, {})), root / target)
     return root
 
 
@@ -184,7 +185,7 @@ def test_numbers_of_which_nobody_knows_whether_they_follow_are_not_checked(examp
     """Designed in Python without options: the same text, but no design to compare it with."""
     from dzdesign.design.designing import design
 
-    write_firmware(generate(design(example_valve), "host"), tmp_path / "firmware")
+    write_generated(generate(design(example_valve), "host"), tmp_path / "firmware")
     again = regenerated(tmp_path / "firmware")
     check = reproduced(tmp_path / "firmware", again)
     assert again.files and check.holds is None and "with which options" in check.text

@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import pytest
 
-from dzdesign.codegen.other_targets import generate_output, settings_of, write_output
-from dzdesign.codegen.project import generate, write_firmware
+from dzdesign.codegen.other_targets import generate_output, settings_of
+from dzdesign.codegen.project import generate
+from dzdesign.codegen.writing import write_generated
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of, write_folder
 from dzdesign.core.artefact_reading import read_artefact
@@ -50,8 +51,8 @@ def plc(compensator, document):
 def folder(tmp_path, compensator, document, plc):
     """A compensator with a firmware and a function block beside it."""
     (tmp_path / "compensator.json").write_bytes(document)
-    write_firmware(generate(compensator, "host"), tmp_path / "firmware")
-    write_output(plc, tmp_path / "plc")
+    write_generated(generate(compensator, "host"), tmp_path / "firmware")
+    write_generated(plc, tmp_path / "plc")
     return tmp_path
 
 
@@ -136,7 +137,7 @@ def test_a_firmware_is_compared_with_its_manifest_but_for_what_is_the_users_to_f
 
 def test_an_output_of_another_compensator_is_said_and_not_listed(folder, digest, compensator):
     other = replace(compensator, made_from=(SourceFile(source="valve.json", sha256="1" * 64),))
-    write_output(generate_output(other, "iec61131", settings_of("iec61131", {})), folder / "theirs")
+    write_generated(generate_output(other, "iec61131", settings_of("iec61131", {})), folder / "theirs")
     made = outputs_in(folder, digest)
     assert [each.place for each in made.listed] == ["firmware/", "plc/"]
     (line,) = made.others

@@ -4,13 +4,14 @@ import ctypes
 from pathlib import Path
 
 from dzdesign.codegen.calibration.block import block_of, built_for
-from dzdesign.codegen.calibration.files import FINDINGS, block_core_files, texts
+from dzdesign.codegen.calibration.files import FINDINGS, block_core_files
 from dzdesign.codegen.calibration.layout import BuiltFor
 from dzdesign.codegen.calibration.packing import pack
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.documents import sha256_of
 from dzdesign.design.compensator import Compensator
 from tests.support.c_library import load_library
+from tests.support.core_texts import texts
 
 
 def block_folder(compensator: Compensator, folder: Path) -> Path:

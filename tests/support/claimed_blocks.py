@@ -6,10 +6,11 @@ from dataclasses import replace
 import numpy as np
 
 from dzdesign.codegen.calibration.acceptance import LARGEST_DROP, largest_node, refusals
-from dzdesign.codegen.calibration.files import block_core_files, texts
+from dzdesign.codegen.calibration.files import block_core_files
 from dzdesign.codegen.calibration.layout import NODE_MASK, PLAY_NODES
 from dzdesign.codegen.calibration.packing import pack
 from tests.support.c_library import load_library
+from tests.support.core_texts import texts
 from tests.support.paths import TESTS
 
 INT32, INT63 = 2**31 - 1, 2**63 - 1

@@ -5,9 +5,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from dzdesign.codegen.calibration.block import built_for, current_block, numbers_of
-from dzdesign.codegen.calibration.files import texts, valve_files
+from dzdesign.codegen.calibration.files import valve_files
 from dzdesign.codegen.calibration.numbers import ValvePage
 from dzdesign.design.current.circuit import CurrentLoop, SupplyCorrection
+from tests.support.core_texts import texts
 from tests.support.core_variants import variant
 
 PLAIN = CurrentLoop(

@@ -2,7 +2,8 @@
 
 import pytest
 
-from dzdesign.codegen.other_targets import generate_output, write_output
+from dzdesign.codegen.other_targets import generate_output
+from dzdesign.codegen.writing import write_generated
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.design.compensator import Compensator
 from dzdesign.verify.outputs.texts import available_octave
@@ -23,5 +24,5 @@ def output_of(made):
 
 def written(made, folder):
     """Write the output for MATLAB of a compensator; return the folder."""
-    write_output(output_of(made), folder)
+    write_generated(output_of(made), folder)
     return folder

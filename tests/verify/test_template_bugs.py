@@ -7,7 +7,8 @@ import pytest
 
 from dzdesign.codegen import project
 from dzdesign.codegen.calibration.block import block_of
-from dzdesign.codegen.project import generate, write_firmware
+from dzdesign.codegen.project import generate
+from dzdesign.codegen.writing import write_generated
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs, input_checks
@@ -60,7 +61,7 @@ def generated(compensator, other, monkeypatch, folder, bug=""):
     if bug and not name:
         digest = sha256_of(to_json_bytes(other))
         monkeypatch.setattr(project, "block_of", lambda *_: block_of(other, digest))
-    write_firmware(generate(compensator, "host", "block"), folder)
+    write_generated(generate(compensator, "host", "block"), folder)
     assert all(found) and bool(found) == bool(name)
     return folder
 

@@ -6,18 +6,14 @@ A module may also offer ``note_of(compensator, settings) -> str``: what of this 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from importlib import import_module
-from pathlib import Path
 
 from dzdesign.codegen.amplifier.device import DEVICE_NAMES
-from dzdesign.codegen.earlier_firmware import refuse_another_design, target_in
 from dzdesign.codegen.project import TARGET_NAMES, TEXT_AS_IT_IS, origin_of, target_named
-from dzdesign.core.artefact_files import sha256_of, write_folder
-from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, schema_of, to_json_bytes
-from dzdesign.core.documents import family_of
-from dzdesign.core.errors import InputError, nearest, quoted
-from dzdesign.core.folder_contents import manifest_of
+from dzdesign.core.artefact_files import sha256_of
+from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
+from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.options import flag_of
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.design.compensator import Compensator
@@ -168,38 +164,3 @@ def generate_output(
         files={path: sha256_of(content) for path, content in files.items()},
     )
     return Output(files=files, manifest=manifest, compensator=compensator, note=note)
-
-
-def write_output(output: Output, folder: Path, *, over_another: bool = False) -> Output:
-    """Write the folder of an output; the result is the same, with a note on another kind that was replaced.
-
-    A place that can't be written, or holds what would be lost, is an `InputError`; so is one with another kind of
-    output, or with that of another design, unless it is to be written over.
-    """
-    target = output.manifest.target
-
-    def check() -> None:
-        if not over_another:
-            _refuse_another_kind(Path(folder), target)
-            refuse_another_design(Path(folder), output.compensator)
-
-    check()  # of two at once, the other one may have written since
-    earlier = target_in(Path(folder))
-    write_folder(Path(folder), output.contents, output.manifest, check)
-    if earlier in ("", target):
-        return output
-    note = f"the {earlier} output in '{folder}' was replaced by this {target}"
-    note += "; to have both, give each its own folder with -o"
-    return replace(output, note="; ".join(filter(None, [output.note, note])))
-
-
-def _refuse_another_kind(folder: Path, target: str) -> None:
-    """Refuse a folder with another kind of output: that of this one is no newer version of it."""
-    manifest = manifest_of(folder)
-    if manifest is None or family_of(manifest["schema"]) != family_of(schema_of(OutputManifest)):
-        return  # nothing, or what is refused where it is written
-    if (earlier := manifest.get("target")) != target:
-        raise InputError(
-            f"'{folder}' holds an output for {quoted(earlier)}, which this one for {target} would replace; choose a "
-            "new folder with -o, or give `codegen` --replace to write over it"
-        )

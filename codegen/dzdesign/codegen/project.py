@@ -1,11 +1,10 @@
 """`generate`: a `Compensator` and a target in, the files of a C project out."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from importlib.resources import files as files_of
-from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING
 
@@ -22,16 +21,14 @@ from dzdesign.codegen.calibration.files import (
 from dzdesign.codegen.calibration.layout import BuiltFor, CalibrationBlock
 from dzdesign.codegen.calibration.packing import OCTETS, pack
 from dzdesign.codegen.core.certificate_text import zero_command
-from dzdesign.codegen.core.constants import FAULT_BITS, CoreFile, Values
-from dzdesign.codegen.core_costs import MEASURED, STAND_IN
-from dzdesign.codegen.earlier_firmware import refuse_another_design, target_in
+from dzdesign.codegen.core.constants import FAULT_BITS, Values
 from dzdesign.codegen.loading.protocol import LOAD_FILES, STORE, load_texts
 from dzdesign.codegen.target import Target, folder_of
 from dzdesign.codegen.vectors import vectors_text
 from dzdesign.codegen.wiring import wiring_of
-from dzdesign.core.artefact_files import sha256_of, write_folder
+from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
-from dzdesign.core.errors import InputError, nearest
+from dzdesign.core.errors import DzdesignError, InputError, nearest
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.core.strict_templates import strict_templates
 from dzdesign.design.certificate import reach_of_certificate
@@ -76,33 +73,6 @@ class Firmware(ShownInNotebooks):
     def contents(self) -> Mapping[str, str | bytes]:
         """Content of each file to write, by path, calibration block included."""
         return {**self.files, **({BLOCK_FILE: self.block} if self.block else {})}
-
-
-def write_firmware(firmware: Firmware, folder: Path, *, over_another: bool = False) -> Firmware:
-    """Write a firmware folder; board files that their user changed in an earlier one stay as they are.
-
-    The result is the same firmware, with a note on what was kept, and on a target that was replaced. A place that can't
-    be written, or holds files that would be lost, is an `InputError`; so is one with the firmware of another design,
-    unless it is to be written over.
-    """
-
-    def check() -> None:
-        if not over_another:
-            refuse_another_design(Path(folder), firmware.compensator)
-
-    check()  # of two at once, the other one may have written since
-    earlier = target_in(Path(folder))
-    kept = write_folder(folder, firmware.contents, firmware.manifest, check)
-    notes = [firmware.note] if firmware.note else []
-    if earlier not in ("", firmware.manifest.target):
-        gone = f"the firmware for {earlier} in '{folder}' was replaced by this one for {firmware.manifest.target}"
-        notes.append(f"{gone}; to have both, give each its own folder with -o")
-    if kept:
-        note = f"kept as you changed it: {', '.join(kept)}"
-        if newer := [name for name, other in kept.items() if other]:
-            note += f"; would be generated otherwise now: {', '.join(newer)}"
-        notes.append(f"{note}; for what is generated now, move yours away or choose a new folder with -o")
-    return replace(firmware, note="; ".join(notes))
 
 
 def target_named(name: str) -> Target:
@@ -156,15 +126,18 @@ def generate(
     banner, block = banner_of(compensator, digest), None
     if calibration == "block":
         block = block_of(compensator, digest)
-        core = _in_core(block_core_files(built_for(compensator)))
+        core = block_core_files(built_for(compensator))
         first_lines = banner.of_any_valve
     else:
-        core = _in_core(fixed_core_files(compensator))
+        core = fixed_core_files(compensator)
         first_lines = banner.lines
-    files = {
-        path: _render(PACKAGE, file.template, first_lines(file.template), file.values) for path, file in core.items()
-    }
-    files |= target_files(compensator, target, banner, block) | TEXT_AS_IT_IS | {"compensator.json": document.decode()}
+    texts = _core_texts(core, first_lines)
+    files = (
+        texts
+        | target_files(compensator, target, banner, block)
+        | TEXT_AS_IT_IS
+        | {"compensator.json": document.decode()}
+    )
     octets = pack(block) if block else b""
     if vectors:
         files[VECTORS_NAME] = vectors_text(compensator, vectors)
@@ -174,11 +147,10 @@ def generate(
         target=target.name,
         calibration=calibration,
         law=compensator.law,
-        core=tuple(sorted(core)),
+        core=tuple(sorted(texts)),
         board=tuple(sorted(target.board | (board_of_blocks(target) if block else frozenset()))),
         origin=origin_of(compensator, digest),
         vectors=vectors,
-        constants=tuple(constant for path in sorted(core) for constant in core[path].constants),
         files={path: sha256_of(text.encode()) for path, text in files.items()}
         | ({BLOCK_FILE: sha256_of(octets)} if octets else {}),
     )
@@ -193,16 +165,13 @@ def origin_of(compensator: Compensator, digest: str) -> FirmwareOrigin:
 
 def block_core(built: BuiltFor) -> dict[str, str]:
     """Return the core of the firmware in block form, path to text: the same for every valve that it is compiled for."""
-    lines = Banner(digest="").of_any_valve  # which names no compensator
-    return {
-        path: _render(PACKAGE, file.template, lines(file.template), file.values)
-        for path, file in _in_core(block_core_files(built)).items()
-    }
+    return _core_texts(block_core_files(built), Banner(digest="").of_any_valve)  # which names no compensator
 
 
-def _in_core(files: Mapping[str, CoreFile]) -> dict[str, CoreFile]:
-    """Return files of the core by their paths in the firmware."""
-    return {f"core/{name}": file for name, file in files.items()}
+def _core_texts(core: Mapping[str, Values], lines: Callable[[str], Sequence[str]]) -> dict[str, str]:
+    """Return the files of the core by their paths in the firmware; `lines` gives the first lines of a template's."""
+    templates = {name: f"{name}.jinja" for name in core}
+    return {f"core/{name}": _render(PACKAGE, each, lines(each), core[name]) for name, each in templates.items()}
 
 
 def target_files(
@@ -215,7 +184,6 @@ def target_files(
     if target.takes_any_signals and compensator.target:  # a target without a converter of its own takes any
         full_V = compensator.target.converter.full_V
     values = {
-        **target.context,
         "bipolar": len(signals.signs) == 2,
         "signals": signals,
         "units": compensator.valve.recorded_units.of_controller,
@@ -234,11 +202,13 @@ def target_files(
         "wiring": wiring_of(compensator, Converter(full_V=full_V, levels=levels)),
         "firmware_origin": f"0x{banner.digest[:4].upper()}",
         "lot_setting": banner.lot,
-        "core_cost": MEASURED.get(target.name, MEASURED[STAND_IN]),
         "block_octets": OCTETS,
-        "cost_is_of_another": target.name not in MEASURED,
+        "on_cortex_m4": target.name == "cortex-m4",
         "certificate_reach": fill(reach_of_certificate(compensator), README_COLUMNS),
     }
+    if taken := sorted({"banner", "project", *values} & target.context.keys()):
+        raise DzdesignError(f"target {target.name}: context names {taken} belong to the renderer")
+    values |= target.context
     in_block_form = {**block_templates(target, block), **(target.block_templates if block else {})}
     files = {
         path: _render(

@@ -13,15 +13,6 @@ from dzdesign.design.current.circuit import CurrentSampling
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import Converter, TargetInputs
 
-#: Names that the renderer itself passes to every template; a target's context may not use them.
-RENDERER_NAMES = frozenset(
-    {"banner", "project", "signals", "u_max_V", "drive", "limited", "at_zero", "bipolar", "wiring", "lot_setting"}
-    | {"core_sources", "core_headers", "firmware_origin", "current", "current_faults"}
-    | {"link_sources", "link_headers", "loads"}
-    | {"block", "block_files", "block_sources", "block_headers", "block_lines", "command_zero", "offset_ticks"}
-    | {"sector", "region", "region_page", "region_file", "block_address", "block_words"}
-)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlashSector:
@@ -100,8 +91,6 @@ class Target:
                 raise DzdesignError(
                     f"target {self.name}: context {key!r} must be printed text, got {type(value).__name__}"
                 )
-        if taken := sorted(RENDERER_NAMES & self.context.keys()):
-            raise DzdesignError(f"target {self.name}: context names {taken} belong to the renderer")
         object.__setattr__(self, "templates", MappingProxyType(dict(self.templates)))
         object.__setattr__(self, "block_templates", MappingProxyType(dict(self.block_templates)))
         object.__setattr__(self, "context", MappingProxyType(dict(self.context)))

@@ -7,6 +7,7 @@ voltage is that at the converter's pin, behind them.
 from dataclasses import dataclass
 from fractions import Fraction
 
+from dzdesign.codegen.core.constants import Values
 from dzdesign.core.errors import one_line
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.pressure_inputs import input_columns, negative_drop_in_words
@@ -52,98 +53,45 @@ class PinReading:
         return f"{float(full._pin_V / LOOP_A):.1f}".removesuffix(".0")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CommandPoint:
-    """One command to try."""
-
-    #: In the unit that a person sees; then its share of full command, or ``zero``, ``full``.
-    u_i: str
-    share: str
-    pin: PinReading
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PressureWiring:
-    """One pressure sensor, at no pressure and at its full span."""
-
-    name: str
-    #: Column of the recordings that it stands for; empty where none does.
-    recorded: str
-    signal: PressureSignal
-    zero: PinReading
-    full: PinReading
-    #: No pressure and the span, in the unit that a person sees.
-    none: str
-    span: str
-    #: That makes this of 4-20 mA; empty without a live zero of that kind.
-    shunt_ohm: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CurrentWiring:
-    """The sensor of a solenoid's current, without current and at the rated one, at the converter's pin."""
-
-    zero_V: float
-    rated_V: float
-    zero_code: int
-    rated_code: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Wiring:
-    """What a target's templates print of the signals' wiring."""
-
-    #: What full commands read; then all to try, from the lowest, and those of them that are zero or full.
-    command_range: str
-    commands: tuple[CommandPoint, ...]
-    ends: tuple[CommandPoint, ...]
-    #: The shunt that makes the command of 4-20 mA, or nothing.
-    command_shunt_ohm: str
-    #: What 0 V at the command's pin commands; empty where that code is not valid. Then: whether that opens the valve.
-    no_voltage: str
-    no_voltage_drives: bool
-    pressures: tuple[PressureWiring, ...]
-    #: How the pressure drop of negative commands comes of the inputs; empty for a command of one sign.
-    negative_drop: str
-    #: With current control alone.
-    current: CurrentWiring | None
-
-
-def wiring_of(compensator: Compensator, converter: Converter) -> Wiring:
-    """Return what is to be wired to a target's converter, and tried."""
+def wiring_of(compensator: Compensator, converter: Converter) -> Values:
+    """Return what is to be wired to a target's converter, and tried: what the targets' templates print of it."""
     signals, command = compensator.signals, compensator.signals.command
     points = _commands(compensator, converter)
     zero = PinReading(code=command.zero_code, converter=converter)
-    return Wiring(
-        command_range=f"{points[min(points)].u_i} to {points[max(points)].u_i}",
-        commands=tuple(points.values()),
-        ends=tuple(point for share, point in points.items() if share in (-1, 0, 1)),
-        command_shunt_ohm="" if len(signals.signs) == 2 else zero.shunt_ohm(command.full_code),
-        no_voltage=_no_voltage(command, signals.signs),
-        no_voltage_drives=any(command.from_zero(0, sign) for sign in signals.signs) and command.valid_codes[0] == 0,
-        pressures=tuple(
+    return {
+        "command_range": f"{points[min(points)]['u_i']} to {points[max(points)]['u_i']}",
+        # From the lowest; then those that are zero or full.
+        "commands": tuple(points.values()),
+        "ends": tuple(point for share, point in points.items() if share in (-1, 0, 1)),
+        # That makes the command of 4-20 mA, or nothing.
+        "command_shunt_ohm": "" if len(signals.signs) == 2 else zero.shunt_ohm(command.full_code),
+        # What 0 V at the command's pin commands; empty where that code is not valid. Then whether that opens the valve.
+        "no_voltage": _no_voltage(command, signals.signs),
+        "no_voltage_drives": any(command.from_zero(0, sign) for sign in signals.signs) and command.valid_codes[0] == 0,
+        "pressures": tuple(
             _pressure(name, signal, converter, compensator)
             for name, signal in (("A", signals.pressure_a), ("B", signals.pressure_b))
         ),
-        negative_drop=_in_a_table(negative_drop_in_words(compensator)).replace("negative", "Negative", 1),
-        current=_current(compensator, converter),
-    )
+        # How the pressure drop of negative commands comes of the inputs; empty for a command of one sign.
+        "negative_drop": _in_a_table(negative_drop_in_words(compensator)).replace("negative", "Negative", 1),
+        "current": _current(compensator, converter),
+    }
 
 
-def _commands(compensator: Compensator, converter: Converter) -> dict[Fraction, CommandPoint]:
-    """Return the commands to try, by their share of full command, from the lowest."""
+def _commands(compensator: Compensator, converter: Converter) -> dict[Fraction, Values]:
+    """Return the commands to try, by their share of full command, from the lowest: in the unit that a person sees."""
     signs, command = compensator.signals.signs, compensator.signals.command
     units, sided = compensator.valve.recorded_units.of_controller, len(signs) == 2
-    points = {}
+    points: dict[Fraction, Values] = {}
     for share in sorted({Fraction(0), *(sign * share for sign in signs for share in TRIED)}):
         sign = -1 if share < 0 else 1
         codes = int(abs(share) * command.span(sign) + Fraction(1, 2))
         volts = float(share * compensator.u_max_V)
-        points[share] = CommandPoint(
-            u_i=("+" if share > 0 and sided else "") + units.text(volts, "g V"),
-            share="zero" if not share else f"full{_side(sign, signs)}" if abs(share) == 1 else _percent(abs(share)),
-            pin=PinReading(code=command.zero_code + command.direction(sign) * codes, converter=converter),
-        )
+        points[share] = {
+            "u_i": ("+" if share > 0 and sided else "") + units.text(volts, "g V"),
+            "share": "zero" if not share else f"full{_side(sign, signs)}" if abs(share) == 1 else _percent(abs(share)),
+            "pin": PinReading(code=command.zero_code + command.direction(sign) * codes, converter=converter),
+        }
     return points
 
 
@@ -171,29 +119,32 @@ def _in_a_table(text: str) -> str:
     return one_line(text).replace("|", "\\|")
 
 
-def _pressure(name: str, signal: PressureSignal, converter: Converter, compensator: Compensator) -> PressureWiring:
+def _pressure(name: str, signal: PressureSignal, converter: Converter, compensator: Compensator) -> Values:
+    """Return one sensor at no pressure and at its span, and the column of the recordings that it stands for."""
     units, columns = compensator.valve.recorded_units, dict(zip("AB", input_columns(compensator) or (), strict=False))
     zero, full = (PinReading(code=code, converter=converter) for code in (signal.zero_code, signal.full_code))
-    return PressureWiring(
-        name=name,
-        recorded=_in_a_table(columns.get(name, "")),
-        signal=signal,
-        zero=zero,
-        full=full,
-        none=units.text(0.0, "g MPa"),
-        span=units.text(float(signal.span_MPa), "g MPa"),
-        shunt_ohm=zero.shunt_ohm(full.code),
-    )
+    return {
+        "name": name,
+        "recorded": _in_a_table(columns.get(name, "")),
+        "signal": signal,
+        "zero": zero,
+        "full": full,
+        "none": units.text(0.0, "g MPa"),
+        "span": units.text(float(signal.span_MPa), "g MPa"),
+        # That makes this of 4-20 mA; empty without a live zero of that kind.
+        "shunt_ohm": zero.shunt_ohm(full.code),
+    }
 
 
-def _current(compensator: Compensator, converter: Converter) -> CurrentWiring | None:
+def _current(compensator: Compensator, converter: Converter) -> Values | None:
+    """Return the sensor of the controlled current, without one and at the rated one, at the converter's pin."""
     if (drive := compensator.current_drive) is None:
         return None
     sensor = drive.sensor
     rated_V = sensor.offset_V + sensor.V_per_A * drive.circuit.rated_A
-    return CurrentWiring(
-        zero_V=sensor.offset_V,
-        rated_V=rated_V,
-        zero_code=converter.code(Fraction(sensor.offset_V)),
-        rated_code=converter.code(Fraction(rated_V)),
-    )
+    return {
+        "zero_V": sensor.offset_V,
+        "rated_V": rated_V,
+        "zero_code": converter.code(Fraction(sensor.offset_V)),
+        "rated_code": converter.code(Fraction(rated_V)),
+    }

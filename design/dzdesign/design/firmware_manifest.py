@@ -1,4 +1,4 @@
-"""manifest.json as a type: of a firmware, with where every number in its core came from, and of any other output.
+"""manifest.json as a type: of a firmware, and of any other output.
 
 `codegen` writes it and `verify` compares it with the folder. These share no code, so what both read stands before them.
 """
@@ -20,8 +20,6 @@ BLOCK_FILE = "calibration.bin"
 Text = Annotated[str, Meta(min_length=1)]
 #: Test vectors, beside compensator.json.
 VECTORS_NAME = "vectors.csv"
-#: A number of the C fits 64 bits with sign: every sum of the core is proved to.
-Number = Annotated[int, Meta(ge=-(2**31), le=2**63 - 1)]
 
 
 def form_named(name: str | None) -> Calibration:
@@ -48,30 +46,8 @@ class FirmwareOrigin:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FirmwareConstant:
-    """One number of the core: a `#define`, or a member of the valve's numbers."""
-
-    file: Annotated[Text, Meta(description="File in the firmware.")]
-    symbol: Annotated[Text, Meta(description="Name in C.")]
-    value: Annotated[
-        Number | tuple[tuple[Number, Number], ...],
-        Meta(description="Value in C; for a table its rows: of beta the law's and the certified one, else one number."),
-    ]
-    equation: Annotated[Text, Meta(description="Source equation and the meaning of the constant in it.")]
-    engineering: Annotated[Text, Meta(description="Value in engineering units.")]
-    rounding: Annotated[Text, Meta(description="Rounding that was applied.")]
-    compensator_json: Annotated[
-        tuple[Text, ...], Meta(description="Keys of compensator.json from which the value was computed.")
-    ]
-    valve_json: Annotated[
-        tuple[Text, ...],
-        Meta(description="Keys of valve.json from which the value was computed; empty if it is an option of `design`."),
-    ]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class FirmwareManifest(Artefact):
-    """Files of a firmware and the origin of every number in its core, as `dzdesign codegen` writes it."""
+    """Files of a firmware and their origin, as `dzdesign codegen` writes it."""
 
     FILE_NAME: ClassVar[str] = MANIFEST_NAME
     schema: Annotated[Literal["dzdesign.firmware/1"], Meta(description="Name and version of this schema.")] = (
@@ -102,9 +78,6 @@ class FirmwareManifest(Artefact):
             ge=0,
             le=99999,
         ),
-    ]
-    constants: Annotated[
-        tuple[FirmwareConstant, ...], Meta(description="Constants of the core, in the order of the files.")
     ]
     files: Annotated[Mapping[Text, Sha256], Meta(description="SHA-256 of each generated file, by file name.")]
 

@@ -74,7 +74,8 @@ def write_lot_firmware(
     Until a valve's own block is loaded it has that of the lot setting, which over-compensates none of the valves;
     where there is no such setting that of the first valve.
     """
-    from dzdesign.codegen.project import generate, write_firmware
+    from dzdesign.codegen.project import generate
+    from dzdesign.codegen.writing import write_generated
 
     if not designed:
         return None
@@ -84,7 +85,7 @@ def write_lot_firmware(
     compensator = setting if setting is not None and fits else designed[first]
     folder = output / LOT / FIRMWARE
     firmware = generate(compensator, project.target, "block")
-    write_firmware(firmware, folder, over_another=True)
+    write_generated(firmware, folder, over_another=True)
     return LotFirmware(
         folder=f"{LOT}/{FIRMWARE}",
         target=project.target,

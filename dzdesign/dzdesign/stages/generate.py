@@ -106,7 +106,7 @@ def _firmware(arguments: GenerateArguments, target: str) -> "Firmware":
     """Generate the C project, and write it where that is asked for."""
     from dzdesign.codegen.other_targets import settings_of
     from dzdesign.codegen.project import generate as generate_project
-    from dzdesign.codegen.project import write_firmware
+    from dzdesign.codegen.writing import write_generated
     from dzdesign.design.firmware_manifest import form_named
 
     form = form_named(arguments.calibration)
@@ -116,13 +116,14 @@ def _firmware(arguments: GenerateArguments, target: str) -> "Firmware":
     firmware = generate_project(made, target if designed else arguments.target, form, vectors)
     if arguments.output is None:
         return firmware
-    return write_firmware(firmware, Path(arguments.output), over_another=arguments.replace)
+    return write_generated(firmware, Path(arguments.output), over_another=arguments.replace)
 
 
 def _other_output(arguments: GenerateArguments, target: str) -> "Output":
     """Generate an output other than a C firmware, and write it where that is asked for."""
-    from dzdesign.codegen.other_targets import OF_FIRMWARE, generate_output, settings_of, write_output
+    from dzdesign.codegen.other_targets import OF_FIRMWARE, generate_output, settings_of
     from dzdesign.codegen.project import DEFAULT_TARGET
+    from dzdesign.codegen.writing import write_generated
 
     given = chosen_of_outputs(arguments)
     of_firmware = {name: getattr(arguments, name) for name in OF_FIRMWARE}
@@ -132,7 +133,7 @@ def _other_output(arguments: GenerateArguments, target: str) -> "Output":
     output = generate_output(made, target, settings)
     if arguments.output is None:
         return output
-    return write_output(output, Path(arguments.output), over_another=arguments.replace)
+    return write_generated(output, Path(arguments.output), over_another=arguments.replace)
 
 
 def chosen_of_outputs(arguments: OutputChoices) -> "dict[str, str | None]":

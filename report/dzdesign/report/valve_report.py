@@ -95,7 +95,7 @@ def _sections(chain: Chain) -> dict[str, Section]:
         **valve_sections(chain.valve, compensator),
         "budget": budget_section(compensator),
         "law": law_section(compensator),
-        "integers": integers_section(chain.firmware, compensator),
+        "integers": integers_section(compensator),
         "inputs": inputs_section(chain),
         "loop": loop_section(chain),
         "checks": checks_section(chain.evidence),

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from dzdesign.codegen.calibration.block import block_of, built_for, current_block
-from dzdesign.codegen.calibration.files import block_core_files, texts
+from dzdesign.codegen.calibration.files import block_core_files
 from dzdesign.codegen.calibration.packing import pack, unpack
 from dzdesign.codegen.f28335.target import TARGET
 from dzdesign.codegen.loading.protocol import LOAD_FILES, STORE
@@ -19,6 +19,7 @@ from dzdesign.verify.exhaustive.drive_check import drive_follows
 from dzdesign.verify.toolchain.host_compiler import STRICT
 from tests.codegen.core.test_misra import findings
 from tests.support.block_cores import block_folder
+from tests.support.core_texts import texts
 from tests.support.core_variants import variant
 from tests.support.current_loops import PLAIN, SUPPLY
 from tests.support.example_coil import SENSORS, with_current

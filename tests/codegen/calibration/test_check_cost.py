@@ -4,11 +4,12 @@ from dataclasses import replace
 
 import pytest
 
-from dzdesign.codegen.calibration.files import block_core_files, texts
+from dzdesign.codegen.calibration.files import block_core_files
 from dzdesign.codegen.calibration.packing import pack
-from dzdesign.codegen.core_costs import CHECK_INSTRUCTIONS
+from dzdesign.codegen.f28335.target import CHECK_INSTRUCTIONS
 from dzdesign.verify.toolchain.machines import CORTEX_M4
 from tests.codegen.calibration.test_check import forms
+from tests.support.core_texts import texts
 from tests.support.loading.device import firmware_files
 from tests.support.paths import TESTS
 

@@ -6,13 +6,14 @@ import pytest
 
 from dzdesign.codegen.calibration.acceptance import refusals
 from dzdesign.codegen.calibration.block import block_of, built_for
-from dzdesign.codegen.calibration.files import block_core_files, texts
+from dzdesign.codegen.calibration.files import block_core_files
 from dzdesign.codegen.calibration.layout import SUPPLY_MASK
 from dzdesign.codegen.calibration.packing import pack
 from tests.codegen.calibration.test_check import with_current
 from tests.support.block_corners import corners, current_corners
 from tests.support.c_library import load_library
 from tests.support.claimed_blocks import TriedBlocks, random_octets
+from tests.support.core_texts import texts
 from tests.support.core_variants import variant
 from tests.support.paths import TESTS
 from tests.support.synthetic import needs_compiler

@@ -9,10 +9,11 @@ from fractions import Fraction
 import pytest
 
 from dzdesign.codegen.calibration.block import block_of, built_for
-from dzdesign.codegen.calibration.files import STRUCTS, block_core_files, texts
+from dzdesign.codegen.calibration.files import STRUCTS, block_core_files
 from dzdesign.codegen.calibration.layout import LENGTH_WORDS, MAGIC, NODE_MASK, CalibrationBlock, members, words_of
 from dzdesign.codegen.calibration.packing import pack, text_of, unpack
 from dzdesign.core.errors import DzdesignError, InputError
+from tests.support.core_texts import texts
 from tests.support.core_variants import variant
 
 DIGEST = "0123456789abcdef" * 4

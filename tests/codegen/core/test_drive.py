@@ -321,17 +321,6 @@ def test_an_unsound_command_lets_go_at_once_and_starts_from_rest():
     assert firmware.outputs == (0, 0, 1 + 32 + above) and firmware.state.ramped == firmware.state.side == 0
 
 
-def test_beta_for_the_telemetry_is_that_of_the_side():
-    compensator = compensator_named("everything")
-    files = generate(compensator, "f28335").files
-    core = load_library({path.removeprefix("core/"): files[path] for path in files if path.startswith("core/")}, "core")
-    signals, rng = compensator.signals, np.random.default_rng(8)
-    for name, sign in (("dz_beta", 1), ("dz_beta_negative", -1)):
-        for a, b in rng.integers(800, 3900, (2000, 2)).tolist():
-            beta = compensator.law_beta(signals.difference(a, b, sign), sign)
-            assert getattr(core, name)(ctypes.c_uint16(a), ctypes.c_uint16(b)) == int(beta * 2**15)
-
-
 def test_the_plain_drive_is_the_law_and_rests_at_zero_until_the_bands_outer_end():
     compensator = golden_compensator("f28335", GOLDENS)
     inner, outer = compensator.zero_band_codes, compensator.drive_functions.leave_zero_codes

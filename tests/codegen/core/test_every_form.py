@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from dzdesign.codegen.calibration.block import block_of, built_for
-from dzdesign.codegen.calibration.files import block_core_files, texts
+from dzdesign.codegen.calibration.files import block_core_files
 from dzdesign.codegen.calibration.packing import pack
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
@@ -13,6 +13,7 @@ from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import PreparedInputs
 from dzdesign.verify.toolchain.compiled_core import CompiledCore
 from tests.support.block_cores import block_folder
+from tests.support.core_texts import texts
 from tests.support.core_variants import firmware, variant
 from tests.support.synthetic import needs_compiler
 

@@ -272,7 +272,6 @@ def test_numbers_follow_from_the_engineering_quantities():
     "change",
     [
         {"context": {"tbprd": 59_999}},
-        {"context": {"banner": "x"}},
         {"templates": {"../outside.c": "main.c.jinja"}},
         {"templates": {"/main.c": "main.c.jinja"}},
         {"compare_max": 70_000},

@@ -52,7 +52,7 @@ def start(program):
 
 def load(device: Device, number: int = 1, line: DeviceLine | None = None) -> DeviceLine:
     line, block = line or DeviceLine(device), blocks()[number]
-    LoadSession(line).load(block, crc_of_block(block), origin_of_block(block))
+    list(LoadSession(line).loading(block, crc_of_block(block), origin_of_block(block)))
     return line
 
 
@@ -196,7 +196,7 @@ def test_a_block_whose_zero_command_is_another_is_refused(start):
     at_command(device, ZERO + 1)
     other = pack(replace(unpack(blocks()[1]), interlock=0))
     with pytest.raises(RefusedError) as caught:
-        LoadSession(DeviceLine(device)).load(other, crc_of_block(other), origin_of_block(other))
+        list(LoadSession(DeviceLine(device)).loading(other, crc_of_block(other), origin_of_block(other)))
     assert caught.value.reason == Reason.COMMAND and device.run(6)["used"] == LINKED
 
 
@@ -288,7 +288,7 @@ def test_a_drive_that_is_enabled_on_the_way_stays_held_until_the_load_is_over(st
     device.tell(f"command {zero}")
     assert device.run(20)["released"] == 0
     line = Eventful(device, "trip 0", 20)
-    LoadSession(line).load(blocks()[1], crc_of_block(blocks()[1]), origin_of_block(blocks()[1]))
+    list(LoadSession(line).loading(blocks()[1], crc_of_block(blocks()[1]), origin_of_block(blocks()[1])))
     assert not line.told, "the trip input was closed on the way"
     first = next(place for place, state in enumerate(line.seen) if state["held"])
     during = [state for state in line.seen[first:-1]]
@@ -305,5 +305,5 @@ def test_telemetry_that_comes_back_between_requests_spoils_no_load(start):
     frame = bytes.fromhex("a55a02") + bytes(range(FRAME_OCTETS - 3))
     for noise in (frame, frame[:7], b"\xc3", b"\xc3\x3c\x01\x05\xff", bytes(40)):
         line = Eventful(device, "", 0, noise)
-        LoadSession(line).load(blocks()[2], crc_of_block(blocks()[2]), origin_of_block(blocks()[2]))
+        list(LoadSession(line).loading(blocks()[2], crc_of_block(blocks()[2]), origin_of_block(blocks()[2])))
         assert device.run(6)["wrong_reads"] == 0

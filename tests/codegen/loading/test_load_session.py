@@ -47,7 +47,7 @@ def reply(frame: Frame, reason: int = 0, detail: int = 0, **changes: int) -> byt
 def load(answer) -> tuple[Answers, LoadSession]:
     line = Answers(answer)
     session = LoadSession(line)
-    session.load(bytes(130), 1, 2)
+    list(session.loading(bytes(130), 1, 2))
     return line, session
 
 
@@ -89,7 +89,7 @@ def test_busy_is_waited_for_but_not_for_ever():
     assert session.repeats == 88 > TRIES
     line = Answers(lambda frame, _: reply(frame, Reason.BUSY))
     with pytest.raises(RefusedError) as caught:
-        LoadSession(line).load(bytes(4), 1, 2)
+        list(LoadSession(line).loading(bytes(4), 1, 2))
     assert caught.value.reason == Reason.BUSY and BUSY_S < line.time_s < 1.1 * BUSY_S
 
 

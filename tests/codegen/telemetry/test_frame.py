@@ -1,6 +1,5 @@
 """The telemetry: one layout in Python and in C, consistent frames whatever comes between, and what it costs."""
 
-import ctypes
 import random
 import re
 import shutil
@@ -204,25 +203,6 @@ def test_a_frame_is_of_one_moment_wherever_the_interrupt_comes(firmware):
 def test_a_state_read_once_is_torn(firmware):
     seed(firmware, "(dz_state.ticks == copy->ticks) ? 1u : 0u", "(dz_state.ticks == copy->ticks) ? 1u : 1u")
     assert torn(preempted_frames(firmware))
-
-
-@needs_compiler
-def test_beta_of_the_frame_is_the_compensators_at_every_difference(example_compensator, example_firmware):
-    from tests.support.c_library import load_library
-
-    names = ("dz_comp.c", "dz_comp.h", "dz_calibration.h", "dz_valve.h")
-    sources = {name: example_firmware.files[f"core/{name}"] for name in names}
-    core = load_library(sources, "dz_comp.c")
-    core.dz_beta.restype, core.dz_beta.argtypes = ctypes.c_uint16, [ctypes.c_uint16] * 2
-    wrong = [
-        difference
-        for difference in range(-3326, 3327)
-        if core.dz_beta(688 + max(difference, 0), 688 + max(-difference, 0))
-        != int(example_compensator.law_beta(difference) * 2**15)
-    ]
-    assert wrong == []
-    fallback = int(example_compensator.law_beta(-3326) * 2**15)
-    assert core.dz_beta(4015, 764) == core.dz_beta(764, 0xFFFF) == core.dz_beta(687, 688) == fallback
 
 
 def test_the_factor_of_beta_is_exact_where_it_counts_and_refused_where_none_is(wording):

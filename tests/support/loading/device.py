@@ -5,9 +5,10 @@ from pathlib import Path
 
 from dzdesign.codegen.banner import Banner
 from dzdesign.codegen.calibration.block import block_of, built_for
-from dzdesign.codegen.calibration.files import block_core_files, texts
+from dzdesign.codegen.calibration.files import block_core_files
 from dzdesign.codegen.f28335.target import TARGET
 from dzdesign.codegen.project import target_files
+from tests.support.core_texts import texts
 from tests.support.f28335_device import HERE as DEVICE
 from tests.support.loading.bench import HERE
 from tests.support.loading.files import COMPILER, DIGEST, compensator, drive_files

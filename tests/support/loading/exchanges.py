@@ -26,7 +26,7 @@ def load(session: LoadSession, block: bytes, **announced: int) -> str:
     """Load a block, and return how it ended: done, refused or no reply."""
     crc, origin = announced.get("crc", crc_of_block(block)), announced.get("origin", origin_of_block(block))
     try:
-        session.load(block, crc, origin)
+        list(session.loading(block, crc, origin))
     except RefusedError as error:
         return f"refused {error.reason}"
     except NoReplyError:

@@ -7,12 +7,13 @@ from pathlib import Path
 
 from dzdesign.codegen.banner import Banner
 from dzdesign.codegen.calibration.block import block_of, built_for
-from dzdesign.codegen.calibration.files import block_core_files, texts
+from dzdesign.codegen.calibration.files import block_core_files
 from dzdesign.codegen.calibration.layout import LENGTH_WORDS
 from dzdesign.codegen.calibration.packing import pack
 from dzdesign.codegen.f28335.target import TARGET
 from dzdesign.codegen.project import target_files
 from dzdesign.design.compensator import Compensator
+from tests.support.core_texts import texts
 from tests.support.golden_firmware import FULL, golden_compensator
 from tests.support.loading.bench import Drive, build_drive
 from tests.support.loading.exchanges import Bench

@@ -5,7 +5,8 @@ import json
 import pytest
 
 from dzdesign import api
-from dzdesign.codegen.other_targets import generate_output, settings_of, write_output
+from dzdesign.codegen.other_targets import generate_output, settings_of
+from dzdesign.codegen.writing import write_generated
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import MANIFEST_NAME
 from dzdesign.core.artefact_reading import read_artefact
@@ -35,7 +36,7 @@ def written(designs, tmp_path):
     def write(name, given):
         made = designs[name]
         output = generate_output(made, "amplifier", settings_of("amplifier", given))
-        write_output(output, tmp_path / "amplifier")
+        write_generated(output, tmp_path / "amplifier")
         return tmp_path / "amplifier"
 
     return write

@@ -7,7 +7,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from dzdesign.codegen.project import generate, target_named, write_firmware
+from dzdesign.codegen.project import generate, target_named
+from dzdesign.codegen.writing import write_generated
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import to_json, write_folder
 from dzdesign.core.artefact_reading import read_artefact
@@ -280,7 +281,7 @@ def test_a_range_that_would_be_none_without_them_and_one_that_another_side_ends(
 def test_firmware_and_report_say_first_that_they_are_of_a_lot(common, batch, tmp_path):
     folder = tmp_path / "firmware"
     made = generate(common.compensator, "f28335")
-    write_firmware(made, folder)
+    write_generated(made, folder)
     document = json.loads((folder / "compensator.json").read_bytes())
     said = f"LOT SETTING of 4 valves, lot SHA-256 {document['lot_sha256']}."
     for name, text in made.files.items():

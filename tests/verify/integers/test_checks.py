@@ -6,7 +6,8 @@ from functools import partialmethod
 import numpy as np
 import pytest
 
-from dzdesign.codegen.other_targets import generate_output, write_output
+from dzdesign.codegen.other_targets import generate_output
+from dzdesign.codegen.writing import write_generated
 from dzdesign.command_line.cli import main
 from dzdesign.core.errors import RequirementError
 from dzdesign.verify.folder import read_compensator, read_output_manifest
@@ -38,7 +39,7 @@ def outputs():
 @pytest.fixture
 def folder(outputs, tmp_path):
     for target, output in outputs.items():
-        write_output(output, tmp_path / target)
+        write_generated(output, tmp_path / target)
     return tmp_path
 
 
@@ -117,7 +118,7 @@ def test_a_good_function_holds_in_octave(folder):
 @pytest.mark.parametrize("name", DESIGNS)
 def test_the_functions_of_another_design_hold_in_octave(name, tmp_path):
     made = variant(name)
-    write_output(generate_output(made, "matlab", {}), tmp_path / "matlab")
+    write_generated(generate_output(made, "matlab", {}), tmp_path / "matlab")
     for sign in made.signals.signs:
         found = function_in_octave(tmp_path / "matlab", sign, made, available_octave())
         assert all(check.holds for check in found.checks)
@@ -201,7 +202,7 @@ def test_the_command_refuses_what_makes_no_sense(folder, tmp_path, capsys, wordi
 
 def test_the_command_writes_the_evidence(example_compensator, tmp_path, capsys):
     folder, evidence = tmp_path / "plc", tmp_path / "evidence"
-    write_output(generate_output(example_compensator, "iec61131", SETTINGS["iec61131"]), folder)
+    write_generated(generate_output(example_compensator, "iec61131", SETTINGS["iec61131"]), folder)
     assert main(["verify", str(folder), "-o", str(evidence)]) == 0
     printed = capsys.readouterr().out
     assert f"HOLDS  FB_DeadZone.st: {EXACT}" in printed and "evidence.json" in printed
@@ -212,7 +213,7 @@ def test_the_command_writes_the_evidence(example_compensator, tmp_path, capsys):
 def test_a_block_of_two_solenoids_keeps_the_bounds_of_both(tmp_path):
     made = compensator_of(GOLDENS_FULL)
     settings = {"dialect": "codesys", "interface": "plc"}
-    write_output(generate_output(made, "iec61131", settings), tmp_path / "iec61131")
+    write_generated(generate_output(made, "iec61131", settings), tmp_path / "iec61131")
     found = checks_of(tmp_path, "iec61131")
     assert all(check.holds for check in found.checks)
     assert [check.id for check in found.checks].count("over-compensation") == 2

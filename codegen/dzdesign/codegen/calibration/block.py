@@ -1,6 +1,5 @@
 """A `Compensator` as the numbers of its calibration block or of a fixed firmware, and what that is compiled for."""
 
-from fractions import Fraction
 from math import floor
 from typing import Any, TypeVar
 
@@ -21,7 +20,7 @@ from dzdesign.codegen.calibration.layout import (
     entries,
 )
 from dzdesign.codegen.calibration.packing import octet_words, text_words
-from dzdesign.codegen.core.integer_form import INT32_MAX, WORD_BITS, IntegerForm, exact_factors, integer_form
+from dzdesign.codegen.core.integer_form import INT32_MAX, WORD_BITS, IntegerForm, exact_reciprocal, integer_form
 from dzdesign.codegen.telemetry.frame import beta_factor
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
@@ -181,7 +180,7 @@ def _side(c: Compensator, sign: int, sizes: Sizes) -> SideBlock:
     factor, shift = beta_factor(unit * c.beta_step_codes, max(form.table) * c.beta_step_codes)
     return SideBlock(
         offset=form.offset,
-        slope=form.slope % 2**32,
+        slope=_twos_complement(form.slope),
         transition=form.transition,
         linear=form.linear << form.linear_shift,
         **_division(form, functions.compare_limit),
@@ -198,6 +197,15 @@ def _side(c: Compensator, sign: int, sizes: Sizes) -> SideBlock:
         band_end=command.zero_code + command.direction(sign) * c.zero_band_codes,
         play=_nodes(functions.play_counts[place], sizes.play_mask, "the width of the inverse play"),
     )
+
+
+def _twos_complement(value: int) -> int:
+    """Return a number as its word of 32 bits has it."""
+    if abs(value) > INT32_MAX:
+        raise InputError(
+            f"the law's slope is {value}, beyond 32 bits; choose scalings with smaller common denominators"
+        )
+    return value % 2**32
 
 
 def _beta_nodes(form: IntegerForm, side: str, room: int) -> tuple[int, ...]:
@@ -221,10 +229,7 @@ def _division(form: IntegerForm, compare_limit: int) -> dict[str, int]:
                 "reciprocal": (1 << WORD_BITS) - 1, "reciprocal_shift": 0}  # fmt: skip
     # The sum stays below 2^63, so no quotient is larger, whatever the limit.
     largest = min((compare_limit + 1) * divisor - 1, INT32_MAX)
-    shifts = range(WORD_BITS, 2 * WORD_BITS)
-    reciprocal, shift = next(exact_factors(Fraction(1, divisor), largest, shifts), (0, WORD_BITS))
-    if not reciprocal:
-        raise InputError(f"no 32-bit reciprocal divides by {divisor} exactly up to {largest}; {ALTERNATIVE}")
+    reciprocal, shift = exact_reciprocal(divisor, largest)
     return {"half": form.half, "quotient_limit": largest, "reciprocal": reciprocal,
             "reciprocal_shift": shift - WORD_BITS}  # fmt: skip
 

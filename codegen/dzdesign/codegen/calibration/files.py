@@ -5,7 +5,7 @@ firmware in block form the one that its caller passes, else the `static const` o
 folds into the code.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from fractions import Fraction
 
@@ -25,7 +25,7 @@ from dzdesign.codegen.calibration.layout import (
     Words,
     entries,
 )
-from dzdesign.codegen.calibration.numbers import ValvePage, valve_keys
+from dzdesign.codegen.calibration.numbers import ValvePage
 from dzdesign.codegen.calibration.packing import pack, unpack
 from dzdesign.codegen.core.certificate_text import (
     KAPPA_ROUNDING,
@@ -36,7 +36,6 @@ from dzdesign.codegen.core.certificate_text import (
 )
 from dzdesign.codegen.core.constants import (
     LITERALS,
-    CoreFile,
     Define,
     Values,
     c_comment,
@@ -44,12 +43,10 @@ from dzdesign.codegen.core.constants import (
     defines,
     difference_place,
     drive_status_constants,
-    misra_lines,
     status_constants,
 )
 from dzdesign.codegen.core.integer_form import INT32_MAX
 from dzdesign.codegen.target import Target
-from dzdesign.core.strict_templates import strict_templates
 from dzdesign.derivation.law import law
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.current.circuit import CORRECTION_SHIFT
@@ -82,26 +79,26 @@ BLOCK_SOURCE, BLOCK_HEADER, LINKER_FILE = "dz_block.c", "dz_block.h", "dz_calibr
 CRC_POLYNOMIAL = 0xEDB88320
 
 
-def block_core_files(built: BuiltFor) -> dict[str, CoreFile]:
-    """Return every file of the core in block form, by its name: they depend on no valve."""
+def block_core_files(built: BuiltFor) -> dict[str, Values]:
+    """Return what each file of the core in block form prints, by its name: it depends on no valve."""
     return _files(built)
 
 
-def fixed_core_files(compensator: Compensator) -> dict[str, CoreFile]:
-    """Return every file of the core with the numbers of a compensator in it, by its name."""
+def fixed_core_files(compensator: Compensator) -> dict[str, Values]:
+    """Return what each file of the core with the numbers of a compensator in it prints, by its name."""
     built = built_for(compensator, fixed=True)
     return valve_files(ValvePage(compensator=compensator, block=numbers_of(compensator), built=built))
 
 
-def valve_files(page: ValvePage) -> dict[str, CoreFile]:
-    """Return every file of a core that has these numbers in it."""
+def valve_files(page: ValvePage) -> dict[str, Values]:
+    """Return what each file of a core that has these numbers in it prints."""
     return {VALVE_HEADER: _valve_header(page), **_files(page.built, page.block)}
 
 
-def _files(built: BuiltFor, numbers: CalibrationBlock | None = None) -> dict[str, CoreFile]:
+def _files(built: BuiltFor, numbers: CalibrationBlock | None = None) -> dict[str, Values]:
     """Return what both forms have; `numbers` are those that stand in the firmware."""
     plan = _plan(built)
-    return {name: _core_file(name, plan, constants) for name, constants in _constants(built, numbers).items()}
+    return {name: {**plan, "constants": defines(constants)} for name, constants in _constants(built, numbers).items()}
 
 
 def core_sources(*, block: bool, current: bool) -> tuple[str, ...]:
@@ -151,24 +148,12 @@ def _plan(built: BuiltFor) -> Values:
     }
 
 
-def _core_file(name: str, values: Values, constants: Sequence[Define]) -> CoreFile:
-    """Return a file that prints these constants."""
-    return CoreFile(
-        template=f"{name}.jinja",
-        values={**values, "misra_lines": misra_lines(name, fixed=bool(values["fixed"])),
-                "constants": defines(constants)},
-        constants=tuple(each.entry(f"core/{name}") for each in constants),
-    )  # fmt: skip
-
-
-def _valve_header(page: ValvePage) -> CoreFile:
+def _valve_header(page: ValvePage) -> Values:
     """Return dz_valve.h: the numbers, and what they are certified for."""
     c = page.compensator
     chosen, units = law(c.law), c.valve.recorded_units.of_controller
-    keys, name = valve_keys(c), f"core/{VALVE_HEADER}"
-    values: Values = {
+    return {
         **_form(page.built),
-        "misra_lines": misra_lines(VALVE_HEADER, fixed=True),
         "u_max": units.text(float(c.u_max_V), "g V"),
         "law_text": str(chosen.output).replace("**", "^"),
         "law_equation": equation_of(chosen),
@@ -185,8 +170,6 @@ def _valve_header(page: ValvePage) -> CoreFile:
         ],
         "lines": page.lines(),
     }
-    constants = tuple(number.constant(name, keys) for number in page.numbers())
-    return CoreFile(template=f"{VALVE_HEADER}.jinja", values=values, constants=constants)
 
 
 def _rational(value: Fraction) -> str:
@@ -231,7 +214,7 @@ def _constants(built: BuiltFor, numbers: CalibrationBlock | None) -> dict[str, l
                engineering=f"{built.tick_Hz} periods and {built.sample_Hz} samples a second"),
         *([] if numbers is None else [
             Define(symbol="DZ_DRIVE_COMMAND_ZERO", value=numbers.command_zero, equation="code of zero command",
-                   engineering="command_zero of dz_valve.h", data=("signals.command.zero_code",))
+                   engineering="command_zero of dz_valve.h")
         ]),
         *drive_status_constants(block=not built.fixed),
     ]  # fmt: skip
@@ -240,8 +223,7 @@ def _constants(built: BuiltFor, numbers: CalibrationBlock | None) -> dict[str, l
         found["dz_current.h"] = current_fault_bits()
     if built.has("CURRENT") and numbers is not None:
         offset = Define(symbol="DZ_CURRENT_OFFSET_TICKS", value=1 << numbers.current.offset_shift,
-                        equation="sums that the offset is the mean of", engineering="with the output off",
-                        data=("current_drive.loop.offset_shift",))  # fmt: skip
+                        equation="sums that the offset is the mean of", engineering="with the output off")  # fmt: skip
         found["dz_current.h"].insert(0, offset)
     if built.has("SUPPLY"):
         found["dz_current.c"] += [
@@ -277,13 +259,6 @@ def _sides(built: BuiltFor) -> list[Values]:
     positive = {"s": "", "text": "positive", "from_band": forward, "turn": "", "pad": ""}
     negative = {"s": "_negative", "text": "negative", "from_band": back, "turn": swapped, "pad": " " * 9}
     return [positive, negative] if built.has("BIPOLAR") else [positive]
-
-
-def texts(files: dict[str, CoreFile], banner: Sequence[str] = ()) -> dict[str, str]:
-    """Return the text of each file, by name, without a firmware around it."""
-    templates = strict_templates("dzdesign.codegen.core", "dzdesign.codegen", autoescape=False)
-    return {name: templates.get_template(file.template).render(banner=banner, **file.values) for name, file in
-            files.items()}  # fmt: skip
 
 
 def _declarations(kind: type, built: BuiltFor) -> Iterator[str]:

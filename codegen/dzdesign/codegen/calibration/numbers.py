@@ -1,8 +1,8 @@
 """The numbers of a valve as a C initialiser, the page that an engineer reads: of each what it is, its value in
-engineering units, how it was rounded, and where it comes from. The manifest lists the same.
+engineering units, how it was rounded, and where it comes from.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from textwrap import wrap
@@ -16,7 +16,6 @@ from dzdesign.derivation.law import law
 from dzdesign.derivation.presentation.formulas import to_text
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.drive_functions import RAMP_UNIT
-from dzdesign.design.firmware_manifest import FirmwareConstant
 from dzdesign.design.signals import SIDE_NAMES
 
 SIGNS = (1, -1)
@@ -31,46 +30,6 @@ CLOSES = {"": (), "sides[0]": ("    },", "},"), "sides[1]": ("    },", "},"), "c
 INDENTS = {"": "", "sides[0]": " " * 8, "sides[1]": " " * 8, "current": " " * 4}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Number:
-    """One member of the struct: its path, what it is and holds, and its value in engineering units."""
-
-    path: str
-    entry: Words
-    value: int | tuple[int, ...]
-    engineering: str
-    #: Key of compensator.json, with the side's name; empty for what no single key holds.
-    key: str
-
-    def comment(self, indent: int) -> list[str]:
-        """Return the comment in C that says what the number is, for lines that begin with so many blanks."""
-        unit = f" ({self.entry.unit})" if self.entry.unit else ""
-        value = f": {self.engineering}" if self.engineering else ""
-        origin = f" From {self.key}." if self.key else ""
-        text = f"{self.entry.text}{unit}{value} ({self.entry.rounding}).{origin}"
-        return c_comment((text[0].upper() + text[1:]).replace("²", "^2"), COLUMNS - indent)
-
-    def constant(self, file: str, valve_keys: Mapping[str, tuple[str, ...]]) -> FirmwareConstant:
-        """Return the manifest's entry; an array is a table, of pairs or of single numbers."""
-        value: int | tuple[tuple[int, int], ...]
-        if isinstance(self.value, int):
-            value = self.value
-        elif self.entry.pairs:
-            value = tuple(zip(self.value[::2], self.value[1::2], strict=True))
-        else:
-            value = tuple((number, 0) for number in self.value)
-        return FirmwareConstant(
-            file=file,
-            symbol=self.path,
-            value=value,
-            equation=self.entry.text,
-            engineering=self.engineering or "as it is",
-            rounding=self.entry.rounding,
-            compensator_json=(self.key,) if self.key else (),
-            valve_json=valve_keys.get(self.key, ()),
-        )
-
-
 @dataclass(frozen=True, kw_only=True)
 class ValvePage:
     """The members that the struct of a firmware has, with the numbers of a compensator."""
@@ -79,46 +38,40 @@ class ValvePage:
     block: CalibrationBlock
     built: BuiltFor
 
-    def numbers(self) -> Iterator[Number]:
-        """Yield every member that this firmware has, in the order of the struct."""
+    def lines(self) -> list[str]:
+        """Return what stands between the braces of a `struct dz_calibration`: the members that this firmware has."""
         parts: dict[str, object] = {"": self.block, "current": self.block.current}
         # What is not set C makes zero.
         parts |= {f"sides[{place}]": self.block.sides[place] for place in range(len(self.compensator.signals.signs))}
         if self.built.fixed and not self.built.has("CURRENT"):
             del parts["current"]
+        lines: list[str] = []
+        within = ""
         for path, _, entry in members():
             place, _, name = path.rpartition(".")
             if place not in parts or (entry.of_block and self.built.fixed):
                 continue
-            key, sign = entry.key, self._sign(path)
-            known = self._current if place == "current" else self._own
-            if sign:
-                key = key.replace("*", SIDE_NAMES[sign])
-                known = self._sides[sign]
-            value = getattr(parts[place], name)
-            yield Number(path=path, entry=entry, value=value, engineering=known.get(name, ""), key=key)
-
-    def lines(self) -> list[str]:
-        """Return what stands between the braces of a `struct dz_calibration`."""
-        lines: list[str] = []
-        within = ""
-        for number in self.numbers():
-            place = number.path.rpartition(".")[0]
             if place != within:
                 lines += [*CLOSES[within][: 1 if place == "sides[1]" else None], *OPENS[place]]
                 within = place
-            indent = INDENTS[place]
-            lines += [f"{indent}{line}" for line in (*number.comment(len(indent) + 4), *self._assigned(number))]
+            sign = SIGNS[place == "sides[1]"] if place.startswith("sides") else 0
+            known = self._sides[sign] if sign else self._current if place == "current" else self._own
+            key = entry.key.replace("*", SIDE_NAMES[sign]) if sign else entry.key
+            indent, value = INDENTS[place], getattr(parts[place], name)
+            said = self._comment(entry, known.get(name, ""), key, len(indent) + 4)
+            lines += [f"{indent}{line}" for line in (*said, *self._assigned(name, entry, value, sign))]
         return [*lines, *CLOSES[within]]
 
     @staticmethod
-    def _sign(path: str) -> int:
-        """Return the sign of command whose side a member is of; 0 of no side."""
-        return SIGNS[path.startswith("sides[1]")] if path.startswith("sides") else 0
+    def _comment(entry: Words, engineering: str, key: str, indent: int) -> list[str]:
+        """Return the comment in C that says what a number is, for lines that begin with so many blanks."""
+        unit = f" ({entry.unit})" if entry.unit else ""
+        value = f": {engineering}" if engineering else ""
+        text = f"{entry.text}{unit}{value} ({entry.rounding}).{f' From {key}.' if key else ''}"
+        return c_comment((text[0].upper() + text[1:]).replace("²", "^2"), COLUMNS - indent)
 
-    def _assigned(self, number: Number) -> Iterator[str]:
+    def _assigned(self, name: str, entry: Words, value: int | tuple[int, ...], sign: int) -> Iterator[str]:
         """Yield one member with its value: two halves of a number of 64 bits, pairs in braces, a table's rows."""
-        name, value, entry = number.path.rpartition(".")[2], number.value, number.entry
         if isinstance(value, int):
             words = (value % 2**32, value >> 32) if entry.bits == 64 else (value,)
             printed = [f"{word}u" if entry.bits == 16 else f"UINT32_C({word})" for word in words]
@@ -126,7 +79,7 @@ class ValvePage:
             return
         yield f".{name} = {{"
         if entry.pairs:
-            yield from (f"    {line}" for line in self._rows(value, self._sign(number.path)))
+            yield from (f"    {line}" for line in self._rows(value, sign))
         else:
             texts = ", ".join(f"{each}u" for each in value)
             yield from (f"    {line}" for line in wrap(texts, COLUMNS - 24))
@@ -272,21 +225,3 @@ class ValvePage:
 
     def _share(self, codes: int, sign: int = 1) -> str:
         return share_of_command(self.compensator, codes, sign)
-
-
-def valve_keys(compensator: Compensator) -> dict[str, tuple[str, ...]]:
-    """Return which keys of valve.json `design` read for each key of compensator.json; all else are its options."""
-    found: dict[str, tuple[str, ...]] = {"u_max_V": ("u_max_V",)}
-    for sign in compensator.signals.signs:
-        side = f"sides.{SIDE_NAMES[sign]}"
-        curve = f"{side}.certified.{compensator.side(sign).certificate.guard}"
-        offset, bounds = f"{curve}.u_min0_V", (f"{curve}.offset_V", f"{curve}.u_lower_V", f"{curve}.curvature_V_MPa2")
-        # With a transition the law's offset is that of the opening threshold.
-        opening = (f"{side}.opening_curve",) if compensator.transition_codes else ()
-        found |= {
-            f"{side}.u_min0_over_u_max": opening or (offset,),
-            f"{side}.drive_range_over_u_max": (f"{side}.k_x_max_over_u_max", f"{side}.tests", *(opening or (offset,))),
-            f"{side}.certificate.dp_MPa": (f"{curve}.dp_MPa",),
-            f"{side}.beta": (offset, *bounds, f"{side}.trend", *opening),
-        }
-    return found

@@ -1,8 +1,7 @@
-"""A `#define` of the generated C, and where it is from; C's comment and the manifest's entry print it.
+"""A `#define` of the generated C, with what its comment says of it.
 
 Those of the status words of law, drive and current controller are here: a bit for each fault, by a convention and from
-no datum. So is what the core's banners say of MISRA C:2012: hardware files of the targets are outside of it, as
-registers and the vendors' headers decide what they look like.
+no datum.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -10,7 +9,6 @@ from dataclasses import dataclass
 from textwrap import wrap
 
 from dzdesign.core.errors import DzdesignError
-from dzdesign.design.firmware_manifest import FirmwareConstant
 
 #: What a template prints: texts, and objects of `design` and of this room whose fields it prints.
 Values = Mapping[str, object]
@@ -23,15 +21,13 @@ EXACT = "exact"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Define:
-    """One `#define`: its fields are those of `FirmwareConstant`; `literal` is one of `LITERALS`."""
+    """One `#define`: what the number is, in engineering units, and how it was rounded; `literal` is of `LITERALS`."""
 
     symbol: str
     value: int
     equation: str
     engineering: str
     rounding: str = EXACT
-    #: Keys of compensator.json that it was computed from, dotted; none for what codegen chooses itself.
-    data: tuple[str, ...] = ()
     literal: str = "plain"
 
     def __post_init__(self) -> None:
@@ -46,22 +42,6 @@ class Define:
     def lines(self) -> list[str]:
         """Return the comment and the `#define`."""
         return [*self.comment(), f"#define {self.symbol} {LITERALS[self.literal].format(self.value)}"]
-
-    def entry(self, file: str) -> FirmwareConstant:
-        """Return the manifest's entry of the constant in a file of the firmware."""
-        return FirmwareConstant(
-            file=file, symbol=self.symbol, value=self.value, equation=self.equation, engineering=self.engineering,
-            rounding=self.rounding, compensator_json=self.data, valve_json=(),
-        )  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CoreFile:
-    """One file of the core: its template, what this prints, and the constants among it, for the manifest."""
-
-    template: str
-    values: Values
-    constants: tuple[FirmwareConstant, ...] = ()
 
 
 def c_comment(text: str, columns: int = COLUMNS) -> list[str]:
@@ -137,34 +117,3 @@ def _bits(prefix: str, bits: Iterable[tuple[int, str, str]], of: str) -> Iterabl
     for place, name, text in bits:
         yield Define(symbol=f"{prefix}_{name}", value=1 << place, equation=f"bit {place} of {of}",
                      engineering=text, rounding="a convention")  # fmt: skip
-
-
-#: How it is checked.
-MISRA_CHECK = "MISRA C:2012: nothing found by cppcheck 2.10 (--platform=avr8 --std=c99 --addon=misra) in this file"
-_FOR_CALLERS = "they are for those who call it; not every firmware needs all of them."
-#: Every deviation, by the name of its file: rule, symbols and reason.
-DEVIATIONS = {
-    "dz_calibration.h": "deviation from rule 2.5 (advisory) in DZ_CURRENT_SAMPLES, DZ_CALIBRATION_SUPPLY_NODES, "
-    "DZ_CALIBRATION_SUPPLY_MASK, DZ_CALIBRATION_CURRENT: they are for current control; not every firmware has it.",
-    "dz_drive.h": "deviation from rule 2.5 (advisory) in DZ_DRIVE_TICKS_PER_SAMPLE, DZ_STATUS_CALIBRATION: "
-    + _FOR_CALLERS,
-}
-#: The same of a firmware with the numbers of its valve in it.
-FIXED_DEVIATIONS = {
-    "dz_valve.h": "deviation from rule 5.9 (advisory) in dz_valve: each source has the numbers as constants of its "
-    "own, so that a compiler folds them into the code.",
-    "dz_calibration.h": "deviation from rule 2.5 (advisory) in DZ_COMPARE_MAX, DZ_ADC_CODE_MAX, DZ_SAMPLE_HZ, "
-    "DZ_TICK_HZ, DZ_CURRENT_SAMPLES: " + _FOR_CALLERS,
-    "dz_drive.h": "deviation from rule 2.5 (advisory) in DZ_DRIVE_TICKS_PER_SAMPLE, DZ_DRIVE_COMMAND_ZERO: "
-    + _FOR_CALLERS,
-    "dz_current.h": "deviation from rule 2.5 (advisory) in DZ_CURRENT_OFFSET_TICKS: " + _FOR_CALLERS,
-}
-
-
-def misra_lines(file: str = "", *, fixed: bool = False) -> list[str]:
-    """Return the comment lines on MISRA C:2012 of a file of the core; without a name those of one that is clean."""
-    deviations = FIXED_DEVIATIONS if fixed else DEVIATIONS
-    if file not in deviations:
-        return wrap(f"{MISRA_CHECK}.", COLUMNS - 3)
-    deviation = wrap(deviations[file], COLUMNS - 5, initial_indent="  ", subsequent_indent="  ")
-    return [*wrap(f"{MISRA_CHECK} but for", COLUMNS - 3), *deviation]

@@ -10,7 +10,8 @@ beyond it, together E max(c - Z, 0) + Z r; without a transition it is c. Times t
 integer; cancelling powers of two leaves
 ``total / (divisor 2^shift)`` with an integer `total` of 64 bits, so one shift and one division by a small constant give
 the exactly rounded law. The division is a multiplication by a reciprocal that is proved exact for every dividend that
-can occur.
+can occur. That the firmware's words hold every value is not proved here: of the C `acceptance` does, of another text
+the ranges of its operations.
 """
 
 from collections.abc import Iterator
@@ -27,18 +28,16 @@ from dzdesign.design.compensator import Compensator
 INT32_MAX = 2**31 - 1
 INT64_MAX = 2**63 - 1
 WORD_BITS = 32
-RECIPROCALS_TRIED = 128
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scaling:
     """Units of one side's command and output: counts of those from zero on."""
 
-    #: Full command, the transition's length behind the zero band, full output and its limit.
+    #: Full command, the transition's length behind the zero band, and full output.
     span: int
     transition: int
     full: int
-    limit: int
     #: Whether the output is rounded to the nearest, a half up; else it is rounded down.
     rounds: bool = True
     #: Bits that the sum's shift drops at least: rounding needs one, and a shift by a whole word of 32 costs nothing.
@@ -48,12 +47,7 @@ class Scaling:
 def scaling_of_codes(compensator: Compensator, sign: int) -> Scaling:
     """Return the scaling of converter codes and compare values."""
     signals = compensator.signals
-    return Scaling(
-        span=signals.command.span(sign),
-        transition=compensator.transition_codes,
-        full=signals.compare_max,
-        limit=compensator.drive_functions.compare_limit,
-    )
+    return Scaling(span=signals.command.span(sign), transition=compensator.transition_codes, full=signals.compare_max)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,9 +56,8 @@ class IntegerForm:
 
     ``total = B_law * (slope * X + offset) + (linear * X << linear_shift) + half
     - (B_law - B) * transition * (E - r)``
-    with B_law and B the tables interpolated without rounding;
-    ``compare = min(total >> shift, largest) / divisor``, so that no compare value exceeds the limit; the division is
-    ``(quotient * reciprocal) >> reciprocal_shift``.
+    with B_law and B the tables interpolated without rounding; the output is ``(total >> shift) / divisor``, rounded
+    down.
     """
 
     #: `scale_beta` times the numerators of the law's beta, then twice the smallest of them.
@@ -82,20 +75,10 @@ class IntegerForm:
     half: int
     shift: int
     divisor: int
-    #: Largest quotient that is divided: the one whose compare value is the limit.
-    largest: int
-    #: Whether the law asks for more than the limit anywhere.
-    exceeds: bool
-    reciprocal: int
-    reciprocal_shift: int
 
 
 def integer_form(compensator: Compensator, sign: int = 1, scaling: Scaling | None = None) -> IntegerForm:
-    """Lower the law of one side to integers and prove that nothing overflows and every division is exact.
-
-    `scaling` is that of converter codes where none is given. Coefficients that need more than 64-bit arithmetic are an
-    `InputError`.
-    """
+    """Lower the law of one side to integers, exactly; `scaling` is that of converter codes where none is given."""
     side, units = compensator.side(sign), scaling or scaling_of_codes(compensator, sign)
     terms = _terms(compensator, sign, units)
     divisor, shift, common = _denominator(terms, units.least_shift)
@@ -103,12 +86,7 @@ def integer_form(compensator: Compensator, sign: int = 1, scaling: Scaling | Non
     span = units.span * (units.transition or 1)
     scale_beta = _share((slope, offset, transition), (abs(slope) * span, abs(offset), transition * units.transition))
     linear, linear_shift = _odd_part(linear)
-    largest = (units.limit + 1) * divisor - 1
-    asked = _largest_quotient(compensator, sign, divisor) if scaling is None else INT32_MAX
-    if asked > INT32_MAX:
-        raise InputError(f"the law's quotient by {divisor} needs more than 31 bits; choose other scalings")
-    reciprocal, reciprocal_shift = exact_reciprocal(divisor, largest)
-    form = IntegerForm(
+    return IntegerForm(
         table=_table(side.law_beta, scale_beta),
         zero_table=_table(side.beta, scale_beta) if units.transition else (),
         scale_beta=scale_beta,
@@ -120,13 +98,7 @@ def integer_form(compensator: Compensator, sign: int = 1, scaling: Scaling | Non
         half=common // 2 if units.rounds else 0,
         shift=shift,
         divisor=divisor,
-        largest=largest,
-        exceeds=asked > largest,
-        reciprocal=reciprocal,
-        reciprocal_shift=reciprocal_shift,
     )
-    _prove_widths(form, compensator.beta_step_codes, units)
-    return form
 
 
 class _Terms(NamedTuple):
@@ -198,73 +170,23 @@ def _share(coefficients: tuple[int, ...], sizes: tuple[int, ...]) -> int:
     return next((factor for factor in factors if all(value % factor == 0 for value in coefficients)), 1)
 
 
-def _largest_quotient(compensator: Compensator, sign: int, divisor: int) -> int:
-    """Return the largest ``total >> shift``: the law's largest value at any node, and the half that rounds it."""
-    c, command = compensator, compensator.signals.command
-    # Every node that a code reaches, and the fallback's smallest beta: along dP the law is linear between them.
-    codes = [index * c.beta_step_codes for index in range(c.nodes(sign) - 1)]
-    codes += [c.signals.largest_difference(sign), -c.reverse_codes - 1]
-    # Along the command it is straight but for the ends of zero band and transition.
-    corners = {0, c.transition_end, command.span(sign)}
-    commands = [command.zero_code + command.direction(sign) * corner for corner in corners]
-    different = {(c.law_beta(code, sign), c.beta(code, sign)): code for code in codes}
-    values = [c.counts(code, dp_code, sign) for dp_code in different.values() for code in commands]
-    if min(values) < 0:
-        raise InputError("the law asks for a negative drive somewhere; check k x_max/u_max and u_min0")
-    return int((max(values) + Fraction(1, 2)) * divisor)
-
-
-def exact_factors(share: Fraction, largest: int, shifts: range, tried: int = 1) -> Iterator[tuple[int, int]]:
+def exact_factors(share: Fraction, largest: int, shifts: range) -> Iterator[tuple[int, int]]:
     """Yield (m, s) with ``v * m >> s`` equal to v times `share`, rounded down, for every v up to `largest`.
 
     With n/d the share in lowest terms, m at or above 2^s n/d and e = m d - 2^s n, the quotient errs by v e / (d 2^s).
-    That must stay below 1/d, the least distance of v n/d to the integer above it. `tried` are the values of m at each
-    shift; none has more than 32 bits, and no product more than 64.
+    That must stay below 1/d, the least distance of v n/d to the integer above it. No m has more than 32 bits, and no
+    product more than 64.
     """
     numerator, denominator = share.as_integer_ratio()
     for shift in shifts:
-        least = -(-(numerator << shift) // denominator)
-        for factor in range(least, least + tried):
-            excess = factor * denominator - (numerator << shift)
-            if factor < 1 << 32 and factor * largest < 1 << 64 and largest * excess < 1 << shift:
-                yield factor, shift
+        factor = -(-(numerator << shift) // denominator)
+        excess = factor * denominator - (numerator << shift)
+        if factor < 1 << 32 and factor * largest < 1 << 64 and largest * excess < 1 << shift:
+            yield factor, shift
 
 
 def exact_reciprocal(divisor: int, largest: int) -> tuple[int, int]:
-    """Return (m, s) with ``n // divisor == n * m >> s`` for every n up to `largest`."""
-    if divisor == 1:
-        return 1, 0
-    exact = list(exact_factors(Fraction(1, divisor), largest, range(32, 64), RECIPROCALS_TRIED))
-    if not exact:
-        raise InputError(f"no 32-bit reciprocal divides by {divisor} exactly up to {largest}")
-    # A multiplier of few ones tempts compilers to shifts and additions, which take longer than one long product.
-    return max(exact, key=lambda pair: _signed_digits(pair[0]))
-
-
-def _signed_digits(value: int) -> int:
-    """Return how many digits of a number are not zero in the signed binary form that has fewest of them."""
-    return (value ^ 3 * value).bit_count()
-
-
-def _prove_widths(form: IntegerForm, step: int, units: Scaling) -> None:
-    """Prove that every intermediate value fits the type that the template gives it."""
-    span = units.span * (units.transition or 1)
-    beta = max(form.table) * step
-    gap = beta if form.zero_table else 0
-    inner = max(abs(form.offset), abs(form.slope * span + form.offset))
-    straight = form.linear * span << form.linear_shift
-    lowering = form.transition * units.transition
-    checks = {
-        "the interpolated table": (beta, INT32_MAX),
-        "slope times command": (abs(form.slope) * span, INT32_MAX),
-        "the command-dependent factor": (inner, INT32_MAX),
-        "the transition's factor": (lowering, INT32_MAX),
-        "the 64-bit sum": (beta * inner + straight + form.half + gap * lowering, INT64_MAX),
-        "the command's own term": (form.linear, 2**32 - 1),
-    }
-    for what, (value, limit) in checks.items():
-        if value > limit:
-            raise InputError(
-                f"{what} needs {value.bit_length()} bits, more than the firmware's {limit.bit_length()}; "
-                "choose scalings with smaller common denominators"
-            )
+    """Return (m, s) with ``n // divisor == n * m >> s`` for every n up to `largest`, s at least a word of 32."""
+    for factor, shift in exact_factors(Fraction(1, divisor), largest, range(WORD_BITS, 2 * WORD_BITS)):
+        return factor, shift
+    raise InputError(f"no 32-bit reciprocal divides by {divisor} exactly up to {largest}; choose other scalings")

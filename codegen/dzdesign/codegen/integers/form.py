@@ -3,11 +3,9 @@
 A sum of products that needs more than 32 bits is one of limbs of 15 bits, each operation of which fits a word of 32.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Union
-
-import numpy as np
 
 from dzdesign.core.errors import DzdesignError, InputError
 
@@ -24,7 +22,7 @@ SMALL = 1 << 24
 class Node:
     """One operation, or an input, a constant or a name of one; `low` and `high` are the ends of its values."""
 
-    #: What it does, as in `EVALUATED`; "input", "number" and "constant" are leaves, "let" names its operand.
+    #: What it does, as `text` spells it; "input", "number" and "constant" are leaves, "let" names its operand.
     operation: str
     operands: tuple["Node", ...] = ()
     low: int
@@ -208,50 +206,6 @@ class Form:
     def heading(self, text: str) -> None:
         """Put a heading before the next line."""
         self.headings[len(self.lines)] = text
-
-    def evaluate(self, given: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Return the value of every line, over arrays of inputs that broadcast against each other."""
-        kind = np.int32 if self.bits == 32 else np.int64
-        found: dict[Node, np.ndarray] = {
-            each: np.asarray(given[each.name], dtype=bool if each.boolean else kind) for each in self.inputs
-        }
-        found |= {each: np.array(each.values if len(each.values) > 1 else each.values[0], dtype=kind)
-                  for each in self.constants}  # fmt: skip
-
-        def value(node: Node) -> np.ndarray:
-            if node in found:
-                return found[node]
-            if node.operation == "number":
-                return np.array(node.low, dtype=kind)
-            operands = [value(each) for each in node.operands]
-            if node.operation in ("/", "mod"):
-                return _divided(node, *operands)
-            return EVALUATED[node.operation](*operands)
-
-        for line in self.lines:
-            found[line] = value(line.operands[0])
-        return {line.name: found[line] for line in self.lines}
-
-
-def _divided(node: Node, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return quotient or remainder, rounded towards zero; by a power of two with shifts, which are quicker."""
-    divisor = node.operands[1]
-    power = divisor.high.bit_length() - 1
-    if divisor.low == divisor.high == 1 << power:
-        up = x if node.operands[0].low >= 0 else x + ((x >> node.bits - 1) & x.dtype.type((1 << power) - 1))
-        quotient = up >> power
-    else:
-        size = np.abs(x) // y
-        quotient = size if node.operands[0].low >= 0 else np.where(x < 0, -size, size)
-    return quotient if node.operation == "/" else x - quotient * y
-
-
-EVALUATED: Mapping[str, Callable[..., np.ndarray]] = {
-    "+": np.add, "-": np.subtract, "*": np.multiply, "neg": np.negative, ">>": np.right_shift, "min": np.minimum,
-    "max": np.maximum, "<": np.less, ">": np.greater, "<=": np.less_equal, "or": np.logical_or,
-    "and": np.logical_and, "not": np.logical_not, "int": lambda x: x.astype(np.int32), "choose": np.where,
-    "of": lambda table, index: table[index],
-}  # fmt: skip
 
 
 class Limbs:

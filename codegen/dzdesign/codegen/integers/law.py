@@ -10,36 +10,23 @@ and a divisor: see codegen/dzdesign/codegen/core/integer_form.py. A word of 64 b
 it is made of limbs.
 """
 
-from collections.abc import Callable, Mapping
-
-import numpy as np
+from collections.abc import Mapping
 
 from dzdesign.codegen.core.integer_form import IntegerForm, Scaling, exact_reciprocal, integer_form
 from dzdesign.codegen.integers.form import Form, Limbs, Node
 from dzdesign.codegen.integers.interface import Interface, interface_named
 from dzdesign.codegen.telemetry.frame import beta_factor
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.firmware_manifest import OutputManifest
 from dzdesign.design.signals import CODE_LIMIT
 
 #: Function of each sign of command.
 FUNCTIONS = {1: "dz_comp", -1: "dz_comp_negative"}
 DINT = 2**31
 LINEAR, HALF = "what the law takes of the command alone", "half a unit of the output, for it is rounded"
-Evaluation = Callable[[Mapping[str, np.ndarray]], dict[str, np.ndarray]]
 #: Bits of the sum that are dropped at most: in limbs of 15 bits, two of them and one bit less than a third.
 MOST_DROPPED = 44
 #: And at least, so that what is left fits a word.
 LEAST_DROPPED = 32
-
-
-def forms_of(compensator: Compensator, manifest: OutputManifest) -> dict[str, Evaluation]:
-    """Return the evaluation of each text of an output, by the name of its file; of others there is none."""
-    if manifest.target == "iec61131":
-        return {"FB_DeadZone.st": block_form(compensator, manifest.settings.get("interface", "")).evaluate}
-    if manifest.target == "matlab":
-        return {f"{FUNCTIONS[sign]}.m": function_form(compensator, sign).evaluate for sign in compensator.signals.signs}
-    return {}
 
 
 def block_form(compensator: Compensator, interface_name: str) -> Form:
@@ -72,8 +59,9 @@ class _Law:
     def _numbers(self, sign: int) -> IntegerForm:
         side, interface = self.sides[sign], self.interface
         least_shift = max(LEAST_DROPPED - twos(side.transition or 1), 1) if self.form.bits == 32 else 1
-        units = Scaling(span=side.span, transition=0, full=interface.full, limit=interface.limit,
-                        rounds=interface.rounds, least_shift=least_shift)  # fmt: skip
+        units = Scaling(
+            span=side.span, transition=0, full=interface.full, rounds=interface.rounds, least_shift=least_shift
+        )
         return integer_form(self.compensator, sign, units)
 
     def one(self, name: str, value: int, meaning: str) -> Node:

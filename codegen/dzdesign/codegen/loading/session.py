@@ -90,11 +90,6 @@ class LoadSession:
                 if not error.is_of_the_line or attempt == LOADS - 1:
                     raise
 
-    def load(self, block: bytes, crc: int, origin: int) -> None:
-        """Write a block as `loading` does."""
-        for _ in self.loading(block, crc, origin):
-            pass
-
     @staticmethod
     def requests_of(block: bytes) -> int:
         """Return how many requests a block takes if none is sent twice."""

@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Annotated, get_origin, get_type_hints
 
+from dzdesign.codegen.core.constants import DRIVE_BITS
+from dzdesign.codegen.core.constants import STATUS_BITS as LAW_BITS
 from dzdesign.codegen.core.integer_form import exact_factors
 from dzdesign.core.errors import InputError
 
@@ -64,8 +66,7 @@ def struct_of(numbers: Mapping[str, Number]) -> struct.Struct:
 
 
 NUMBERS = numbers_of(Frame)
-#: The status word: what the hardware reports, in its low octet, and in the high one what dz_status() and the drive
-#: find wrong.
+#: The status word: what the hardware reports, in its low octet, and in the high one the status of law and drive.
 STATUS_BITS = {
     0x0001: "no usable sample in time",
     0x0002: "trip input went low",
@@ -74,14 +75,7 @@ STATUS_BITS = {
     0x0010: "current not converted in time",
     0x0020: "current sensor, open load, short or over-current",
     0x0040: "no valid calibration block",
-    0x0100: "command outside its valid range",
-    0x0200: "pressure A outside its valid range",
-    0x0400: "pressure B outside its valid range",
-    0x0800: "pressure drop not plausible",
-    0x1000: "pressure drop above the tests",
-    0x2000: "waits for a valid command, or for zero command",
-    0x4000: "smallest beta until the pressures are valid again",
-    0x8000: "fault latched until a reset",
+    **{0x0100 << place: text for place, text in (*enumerate(LAW_BITS.values()), *DRIVE_BITS.values())},
 }
 #: The output is in use; without it the trip zone holds the pin low, whatever the compare value.
 STATUS_RELEASED = 0x0080

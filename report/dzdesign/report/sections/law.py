@@ -18,7 +18,6 @@ from dzdesign.derivation.presentation.report import closure, compose
 from dzdesign.derivation.presentation.writers import HtmlWriter
 from dzdesign.design.certificate import above_in_words, below_in_words, reach_of_certificate
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.firmware_manifest import FirmwareConstant, FirmwareManifest
 from dzdesign.design.side_law import ADDED_IN_FULL, Budget, BudgetLine
 from dzdesign.identify.valve.model import SIDES
 from dzdesign.report.artefacts import laws_of
@@ -36,8 +35,6 @@ from dzdesign.report.page import (
 )
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 
-#: Rows of a constant's table that stand in the page; all of them stand in the CSV.
-MOST_ROWS = 3
 #: Units of a half-width that a person may see in another one, and how many digits.
 SHOWN_UNITS = {"mV": ".3g mV", "MPa": ".3g MPa"}
 BELOW_DP0 = {"hold": "β = 1, as in the paper", "extend": "β as tested"}
@@ -70,56 +67,11 @@ def _exact(value: Fraction) -> str:
     return f"{value.numerator}/{value.denominator} = {float(value):.5f}"
 
 
-def integers_section(firmware: FirmwareManifest | None, compensator: Compensator | None) -> Section:
-    """Return the section on the integers of the C code."""
-    tables = (rounding_table(compensator),) if compensator else ()
-    if firmware is None:
-        return Section(tables=tables, missing="No firmware is here: `dzdesign codegen` makes it, and its constants.")
-    return Section(tables=(*tables, constants_table(firmware)))
-
-
-def constants_table(firmware: FirmwareManifest) -> Table:
-    """Return every number in the C code: what it stands for, how it was rounded and where it comes from."""
-    return table_of(
-        "Every number in the core, in the order of the files",
-        firmware.constants,
-        ("symbol", lambda one: Cell(text=one.symbol, kind="symbol", more=one.file)),
-        ("value", _value),
-        ("in engineering units", lambda one: Cell(text=one.engineering, more=f"rounding: {one.rounding}")),
-        ("what it is", lambda one: one.equation),
-        ("where it comes from", lambda one: Cell(text="", more=_origin(one))),
-        csv=csv_text(
-            ("file", "symbol", "row", "value", "engineering", "rounding"),
-            (
-                (each.file, each.symbol, place, item, each.engineering, each.rounding)
-                for each in firmware.constants
-                for place, item in _rows(each)
-            ),
-        ),
-        name="constants",
-    )
-
-
-def _value(constant: FirmwareConstant) -> str:
-    if isinstance(constant.value, int):
-        return str(constant.value)
-    rows = ", ".join(str(list(row)) for row in constant.value[:MOST_ROWS])
-    return f"{len(constant.value)} rows: {rows}{', ...' if len(constant.value) > MOST_ROWS else ''}"
-
-
-def _rows(constant: FirmwareConstant) -> Iterator[tuple[int | None, str]]:
-    if isinstance(constant.value, int):
-        yield None, str(constant.value)
-        return
-    for place, row in enumerate(constant.value):
-        yield place, " ".join(map(str, row))
-
-
-def _origin(constant: FirmwareConstant) -> str:
-    if constant.valve_json:
-        return f"valve: {', '.join(constant.valve_json)}"
-    options = ", ".join(constant.compensator_json)
-    return f"option of design: {options}" if options else "the generator's own"
+def integers_section(compensator: Compensator | None) -> Section:
+    """Return the section on the integers of the C code; every number of it stands in its comments."""
+    if compensator is None:
+        return Section(missing="No compensator is here: `dzdesign design` makes compensator.json.")
+    return Section(tables=(rounding_table(compensator),))
 
 
 def rounding_table(compensator: Compensator) -> Table:

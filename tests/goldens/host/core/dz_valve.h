@@ -3,7 +3,7 @@
 /* Valve identified from: synthetic_1.csv, synthetic_3.csv, synthetic_5.csv */
 /*
  * The numbers of this valve. Of each: what it is, its value in engineering units, in brackets how it was rounded, and
- * the key of compensator.json it comes from; manifest.json lists the same, down to valve.json and the ramp tests.
+ * the key of compensator.json it comes from; manifest.json has the hashes of that file, valve.json and the ramp tests.
  * They are constants of each source of the core, which include this file, so that a compiler folds them into the code.
  *
  * The law, Eq. (18), full command being 10 V:
