@@ -18,11 +18,10 @@ API = (
     (
         "dzdesign.api",
         (
-            "identify", "design", "generate", "calibration", "read_calibration", "export", "verify", "plan", "init",
+            "identify", "design", "generate", "calibration", "read_calibration", "export", "verify", "init",
             "simulate", "assess", "report", "batch",
         ),
     ),
-    ("dzdesign.identify.planning.results", ("SeriesPlan", "SeriesRow")),
     ("dzdesign.initial_options.proposal", ("Proposal",)),
     ("dzdesign.assess.assessment", ("Assessment",)),
     ("dzdesign.report.page", ("Report",)),

@@ -31,10 +31,10 @@ Texts = str | Iterable[str]
 Table = str | Mapping[str, str] | None
 
 #: Headings of the help, in their order; an option without one stands above them.
-EXPECTED, RECORDINGS, METER, FIT, LAW = "expected valve", "recordings", "flow meter", "fit", "law"
+RECORDINGS, METER, FIT, LAW = "recordings", "flow meter", "fit", "law"
 CONNECTIONS, DRIVE, CHECKS = "connections of the firmware", "drive functions", "further checks"
 MACHINE, OUTPUTS = "machine", "outputs other than a C firmware"
-GROUPS = (EXPECTED, RECORDINGS, METER, FIT, LAW, CONNECTIONS, DRIVE, MACHINE, OUTPUTS, CHECKS)
+GROUPS = (RECORDINGS, METER, FIT, LAW, CONNECTIONS, DRIVE, MACHINE, OUTPUTS, CHECKS)
 
 
 @dataclass(frozen=True, slots=True)

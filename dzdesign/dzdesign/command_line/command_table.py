@@ -17,7 +17,6 @@ class Command(NamedTuple):
 PIPELINE, EVIDENCE, SETUP = "from ramps to firmware", "evidence", "getting started and diagnostics"
 
 COMMANDS = {
-    "plan": Command(PIPELINE, "plan a test series: pressures, ramp times, repeats and the predicted error"),
     "init": Command(PIPELINE, "inspect recordings and write a commented dzdesign.toml"),
     "identify": Command(PIPELINE, "fit the valve to its ramp tests: gain, thresholds and beta(dP), in valve.json"),
     "design": Command(PIPELINE, "compute the certified law with exact coefficients, in compensator.json"),
