@@ -34,8 +34,6 @@ COMMANDS = {
     "monitor": Command(SETUP, "record the telemetry of a running firmware as a ramp file"),
     "load": Command(SETUP, "load a calibration block into an amplifier over its serial line"),
     "doctor": Command(SETUP, "list compilers, simulators and packages, and how to install what is missing"),
-    "schema": Command(SETUP, "print the JSON Schema of an artefact: its keys, their meaning and units"),
-    "completion": Command(SETUP, "print the script with which a shell completes commands and options"),
 }
 #: Of the front page.
 EXAMPLES = (

@@ -35,8 +35,6 @@ if TYPE_CHECKING:
 NOT_STATED = ("ramps", "output", "plots", "record")
 #: Options that name files: stated by the names that these have in made_from.
 FILES = ("order", "low_flow")
-#: Of the threshold between the tests.
-PREMISES = "dzdesign.identify.constants:PREMISES"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +63,7 @@ class IdentifyChoices(RampArguments):
     repeatability: Annotated[Text, Option("S", FIT, example="0.1 %", read=percent("0.1 %"))] = None
     """Standard deviation of the threshold from ramp to ramp, in percent of full command, such as "0.1 %" (default:
     measured on repeated ramps, otherwise 0.25 %)."""
-    curve: Annotated[Text, Option("PREMISE", FIT, choices=PREMISES)] = None
+    curve: Annotated[Text, Option("PREMISE", FIT)] = None
     """Premise about the threshold between the tests. line: a straight line against the pressure drop. smooth:
     curvature at most M. monotone: it runs one way. The default is smooth where a curvature is declared or three or more
     pressure drops support it, and monotone otherwise."""
@@ -180,9 +178,7 @@ def _read(
     return parts_of(tests, arguments.from_, arguments.to, options.u_max)
 
 
-def _read_low_flow(
-    paths: list[Path], u_max: float, names: Sequence[str] = ()
-) -> "list[LowFlowTable]":
+def _read_low_flow(paths: list[Path], u_max: float, names: Sequence[str] = ()) -> "list[LowFlowTable]":
     """Read the tables of flows that were measured by hand."""
     from dzdesign.identify.reading.low_flow_table import read_low_flow
 
