@@ -197,9 +197,9 @@ class TestOptionsOfEveryKind:
     def test_tables_order_and_parts_are_taken_again(self, ramps):
         valve = api.identify(
             [ramps / name for name in NAMES[::-1]], order=[NAMES[1], NAMES[0], NAMES[3], NAMES[2]],
-            from_={NAMES[0]: "1 s"}, units=["bar", "%"], meter_lag="0.1 s", confidence=0.95,
+            from_={NAMES[0]: "1 s"}, missing=["OFF", "none"], meter_lag="0.1 s", confidence=0.95,
         )  # fmt: skip
-        assert valve.options.lists == {"order": (NAMES[1], NAMES[0], NAMES[3], NAMES[2]), "units": ("bar", "%")}
+        assert valve.options.lists == {"order": (NAMES[1], NAMES[0], NAMES[3], NAMES[2]), "missing": ("OFF", "none")}
         assert valve.options.tables == {"from_": {NAMES[0]: "1 s"}} and valve.options.texts["confidence"] == "0.95"
         check = tried(valve, in_folder(ramps))
         assert check.holds, check.text

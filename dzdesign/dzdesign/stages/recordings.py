@@ -15,7 +15,6 @@ from dzdesign.core.artefact_files import (
     write_file,
     write_files,
 )
-from dzdesign.core.chosen_units import read_units
 from dzdesign.core.errors import InputError, nearest, neighbour, quoted
 from dzdesign.core.option_readers import percent_range, quantity, whole_number, with_tolerance
 from dzdesign.core.options import (
@@ -97,10 +96,6 @@ class RampArguments(ColumnArguments):
     meter_lag: Annotated[Text, Option("T", METER, example="0.1 s", read=with_tolerance("time"))] = None
     """Lag of the flow meter, with its tolerance, such as "0.1 s +- 0.02 s" (default: found from ramps of two rates).
     Without a tolerance it is 20 %, and at least 0.05 s."""
-    units: Annotated[Texts | None, Option("U", RECORDINGS, read=read_units)] = None
-    """Units of printed and drawn results, such as "bar, %, mA" (default: those of the recordings). They are of
-    pressure, flow, command ("%" of full command, or a voltage) and current. Files stay in V, MPa and L/min. Repeatable;
-    in the options file also a list."""
     knee_window: Annotated[str, Option("A-B", FIT, read=percent_range("the largest flow such as '12-50'"))] = "12-50"
     """Flow range of the straight-line fit, in percent of maximum flow."""
 

@@ -22,7 +22,7 @@ from dzdesign.identify.ramps.dithered_command import without_dither
 from dzdesign.identify.ramps.sides import tests_of_side
 from dzdesign.identify.reading.low_flow_table import LowFlowTable, readings_of_side
 from dzdesign.identify.reading.ramp_test import RampTest
-from dzdesign.identify.reading.units_of_columns import shown_units, units_of
+from dzdesign.identify.reading.units_of_columns import units_of
 from dzdesign.identify.results import Identification, SideIdentification
 from dzdesign.identify.side import identify_side
 from dzdesign.identify.valve.model import DECIMALS, SIDES, Meter, ValveModel, Warning_
@@ -73,8 +73,8 @@ def identify_sides(
     options = options or IdentifyOptions()
     if not tests:
         raise InputError("no ramp tests were given; expected at least one file")
-    units = shown_units(tests, options)
-    dither = options.dithered.of(units_of(tests), options.u_max) if options.dithered else None
+    units = units_of(tests)
+    dither = options.dithered.of(units, options.u_max) if options.dithered else None
     tests = [without_dither(test, dither, options.u_max) for test in tests]
     sides, warnings = _each_side(tests, options, units, low_flow)
     lag = next(iter(sides.values())).described.lag

@@ -260,7 +260,7 @@ def test_colour_is_for_terminals_and_for_who_asks(monkeypatch):
         ("idntify a.csv", "there is no command 'idntify' (did you mean 'identify'?)"),
         ("identify a.csv --meterlag '0.1 s'", "has no option --meterlag (did you mean '--meter-lag'?)"),
         ("identify a.csv --guard mean", "(it is an option of `dzdesign design`, `codegen`, `batch`)"),
-        ("design valve.json --units bar", "(it is an option of `dzdesign identify`, `batch`, `assess`)"),
+        ("design valve.json --meter-lag 1s", "(it is an option of `dzdesign identify`, `batch`, `assess`)"),
         ("verify firmware more", "'more' is one word too many"),
         ("codegen --target f28334 x", "(did you mean 'f28335'?)"),
         ("derive --equation 16b", "no statement '16b' (did you mean"),
