@@ -272,10 +272,9 @@ def refuse_copies(recordings: Sequence["RampTest | LowFlowTable"]) -> None:
     tests = [recording for recording in recordings if isinstance(recording, RampTest)]
     if copy := find_copy(tests):
         raise InputError(
-            f"'{tests[copy.other].source}' is the recording '{tests[copy.one].source}', saved again: from "
-            f"{copy.from_s:.1f} to {copy.to_s:.1f} s, {copy.agree} of {copy.compared} samples with flow have the same "
-            "command, flow and pressure drop. Give it once. A repeated ramp test is welcome, but a copy is no "
-            "repetition, nor is a second run of a simulation without noise"
+            f"'{tests[copy.other].source}' is the recording '{tests[copy.one].source}', saved again: {copy.agree} of "
+            f"{copy.compared} rows with flow are in both. Give it once. A repeated ramp test is welcome, but a copy is "
+            "no repetition, nor is a second run of a simulation without noise"
         )
 
 
