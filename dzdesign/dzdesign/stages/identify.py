@@ -175,7 +175,7 @@ def _read(
         paths, u_max=options.u_max, columns=arguments.columns, dp=arguments.dp,
         sample_rate=arguments.sample_rate, skip_rows=arguments.skip_rows, missing=arguments.missing, names=names,
     )  # fmt: skip
-    return parts_of(tests, arguments.from_, arguments.to, options.u_max)
+    return parts_of(tests, arguments.from_, arguments.to)
 
 
 def _read_low_flow(paths: list[Path], u_max: float, names: Sequence[str] = ()) -> "list[LowFlowTable]":
