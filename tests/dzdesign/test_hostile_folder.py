@@ -28,7 +28,6 @@ OF_ONE_INPUT = (
     "init {} -o {out}.toml",
     "identify {} -o {out}.json --u-max 10V",
     "identify {good} -o {out}.json --config {}",
-    "identify {good} -o {out}.json --low-flow {} --u-max 10V",
     "design {} -o {out}.json",
     "codegen {} -o {out}",
     "calibration {} -o {out}.hex",

@@ -35,7 +35,6 @@ from dzdesign.terminal.progress import say, stage_progress, with_bar
 
 if TYPE_CHECKING:
     from dzdesign.core.artefact_types import Artefact
-    from dzdesign.identify.reading.low_flow_table import LowFlowTable
     from dzdesign.identify.reading.ramp_test import RampTest
 
 
@@ -253,23 +252,21 @@ def _refuse_unnamed(tests: list["RampTest"], declared: Table) -> None:
             )
 
 
-def refuse_copies(recordings: Sequence["RampTest | LowFlowTable"]) -> None:
+def refuse_copies(tests: Sequence["RampTest"]) -> None:
     """Refuse a recording that is given twice: counting a copy as a repeat would understate the uncertainty.
 
     The same file, or the same samples: see `copies`.
     """
     from dzdesign.identify.reading.copies import find_copy
-    from dzdesign.identify.reading.ramp_test import RampTest
 
     known: dict[str, str] = {}
-    for recording in recordings:
+    for recording in tests:
         if recording.sha256 in known:
             raise InputError(
                 f"'{recording.source}' is an exact copy of the recording '{known[recording.sha256]}'; give it once "
                 "(a repeated ramp test is welcome, a copy is no repetition)"
             )
         known[recording.sha256] = recording.source
-    tests = [recording for recording in recordings if isinstance(recording, RampTest)]
     if copy := find_copy(tests):
         raise InputError(
             f"'{tests[copy.other].source}' is the recording '{tests[copy.one].source}', saved again: {copy.agree} of "

@@ -128,7 +128,7 @@ def test_order_and_parts_in_the_options_file_count_for_every_valve(lot, tmp_path
     assert Path("valve.json").read_bytes() == Path("out/valves/V0001/valve.json").read_bytes()
     options = json.loads(Path("valve.json").read_text())["options"]
     assert options["lists"]["order"] == [*names[1:], names[0]] and options["tables"]["from_"] == {"*.csv": "0.05 s"}
-    Path("dz.toml").write_text('low-flow = "glass.csv"\n')
+    Path("dz.toml").write_text('low-flow = "5 +- 1 mL/min at 5.16 V, 5 MPa, closing"\n')
     assert main(["batch", "lot", "-o", "other", "--config", "dz.toml"]) == 2
     assert "'dz.toml': low-flow is of one valve, and batch has no such option" in capsys.readouterr().err
 
