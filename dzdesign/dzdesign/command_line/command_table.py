@@ -1,4 +1,5 @@
-"""The commands: group and help line in `dzdesign --help`; a module of `dzdesign.commands` bears each one's name.
+"""The commands: group and help line in `dzdesign --help`; a module of `dzdesign.commands` bears each one's
+name, or a row of `dzdesign.commands.relays`.
 
 Such a module has ``Arguments``, a dataclass of `dzdesign.core.options`, ``EXAMPLES``, lines for the help, and
 ``run(arguments, json)``, which returns the exit status. `dzdesign --help` imports this module and no command's.
