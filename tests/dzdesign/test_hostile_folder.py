@@ -37,7 +37,6 @@ OF_ONE_INPUT = (
     "batch {} -o {out} --jobs 1",
     "assess {} --after {} -o {out}.json",
     "report {} -o {out}.html",
-    "plan {}",
     "simulate --plant {} -o {out}",
     "load {} --port absent",
 )  # fmt: skip
@@ -126,7 +125,6 @@ OF_A_DAY = (
     ("report", "{out}", "-o", "{out}/report.html"),
     ("report", "{out}/lot", "-o", "{out}/lot.html"),
     ("simulate", "--dp", "1 MPa", "-o", "{out}/simulated"),
-    ("plan", "{out}/valve.json"),
     ("doctor",),
 )  # fmt: skip
 
