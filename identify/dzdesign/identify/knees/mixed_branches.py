@@ -58,7 +58,7 @@ def _pressure_on_its_way(
     settled = _settles_at(recording, item.dp)
     return worded(
         "in '{source}' the pressure drop was {dp:.3g #MPa} on that branch, and {level:.3g MPa} on the other one{when}, "
-        "so it counts as a test of its own. Start the ramp after the pressure has settled and record again, or leave "
+        "so it is another test. Start the ramp after the pressure has settled and record again, or leave "
         "that file out",
         source=source,
         dp=other.dp / MPA,
