@@ -14,7 +14,7 @@ from pathlib import Path
 from dzdesign.core.errors import InputError
 
 #: How the folders are called, in the system's folder for temporary files.
-PREFIX = "dzdesign-run-"
+PREFIX = "dzdesign-tmp-"
 #: File by which a folder is known as made here; without it none is ever removed.
 MARK = ".dzdesign-scratch"
 #: A folder of this age was left by a process that was killed: no command runs for three days.
