@@ -15,9 +15,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).parent))
 
 from figures.draw import draw_all
-from generated import MADE, key_lines
+from generated import MADE, SCHEMAS, key_lines, schema_text
 
-from dzdesign.commands.schema import SCHEMAS, schema_text
 from dzdesign.core.version import __version__
 
 HERE = Path(__file__).parent

@@ -4,12 +4,14 @@ import importlib
 import inspect
 from collections.abc import Callable, Iterator
 from dataclasses import fields
+from json import dumps
+from pkgutil import resolve_name
 from typing import Any, get_type_hints
 
 from dzdesign.codegen.calibration.layout import SHAPE_BITS, Member, members
 from dzdesign.command_line.command_table import COMMANDS
 from dzdesign.command_line.parser import arguments_of_command, command_module, usage_of
-from dzdesign.commands.schema import SCHEMAS, schema_document
+from dzdesign.core.artefact_schema import json_schema
 from dzdesign.core.options import field_docstrings
 from dzdesign.identify.data_quality.catalogue import catalogue
 
@@ -18,11 +20,10 @@ API = (
     (
         "dzdesign.api",
         (
-            "identify", "design", "generate", "calibration", "read_calibration", "export", "verify", "plan", "init",
+            "identify", "design", "generate", "calibration", "read_calibration", "export", "verify", "init",
             "simulate", "assess", "report", "batch",
         ),
     ),
-    ("dzdesign.identify.planning.results", ("SeriesPlan", "SeriesRow")),
     ("dzdesign.initial_options.proposal", ("Proposal",)),
     ("dzdesign.assess.assessment", ("Assessment",)),
     ("dzdesign.report.page", ("Report",)),
@@ -47,6 +48,25 @@ API = (
     ("dzdesign.report.lot.summary", ("LotSummary",)),
     ("dzdesign.core.errors", ("DzdesignError", "InputError", "RequirementError")),
 )
+
+#: Name -> (module and type, the artefact, the command that writes it), in the order of the pipeline.
+SCHEMAS = {
+    "valve": ("dzdesign.identify.valve.model:ValveModel", "valve.json", "identify"),
+    "compensator": ("dzdesign.design.compensator:Compensator", "compensator.json", "design"),
+    "firmware": ("dzdesign.design.firmware_manifest:FirmwareManifest", "manifest.json of a firmware", "codegen"),
+    "output": ("dzdesign.design.firmware_manifest:OutputManifest", "manifest.json of another output", "codegen"),
+    "evidence": ("dzdesign.verify.evidence:Evidence", "verification.json", "verify"),
+    "output-evidence": ("dzdesign.verify.evidence:OutputEvidence", "evidence.json of another output", "verify"),
+    "calibration": (
+        "dzdesign.verify.exhaustive.block_check:BlockCheck", "calibration_check.json", "batch --calibration block"
+    ),
+    "assessment": ("dzdesign.assess.assessment:Assessment", "assessment.json", "assess"),
+    "batch": ("dzdesign.report.lot.summary:LotSummary", "batch.json", "batch"),
+    "reproduction": ("dzdesign.reproduce.artefact:Reproduction", "reproduction.json", "reproduce"),
+    "derivation": (
+        "dzdesign.derivation.presentation.content:DerivationReport", "derivation.json", "derive --format json"
+    ),
+}  # fmt: skip
 
 
 def commands() -> str:
@@ -88,7 +108,7 @@ def _file(name: str) -> str:
             f"## {artefact}",
             "",
             f"{schema['description']} Schema: `{schema['$id']}`,",
-            f'<a href="../schemas/{name}.schema.json">as a file</a>, or `dzdesign schema {name}`. Made by '
+            f'<a href="../schemas/{name}.schema.json">as a file</a>. Made by '
             f"`dzdesign {command}`.",
             "",
             "| key | type | unit | what it is |",
@@ -201,6 +221,45 @@ def key_lines(artefact: type) -> list[str]:
         described += [below[field.name]] if field.name in below else []
         lines += [f":ivar {field.name}: {described[-1]}"] if described else []
     return lines
+
+
+def schema_document(name: str) -> dict[str, Any]:
+    """Return a schema (JSON Schema, draft 2020-12), one of `SCHEMAS`."""
+    return json_schema(resolve_name(SCHEMAS[name][0]))
+
+
+def schema_text(name: str) -> str:
+    """Return a schema as the text of its file."""
+    return one_line_a_field(schema_document(name)) + "\n"
+
+
+def one_line_a_field(node: dict[str, Any], indent: str = "") -> str:
+    """Return a schema as JSON in which everything about a field stands on one line.
+
+    Examples
+    --------
+    >>> print(one_line_a_field({"type": "object", "properties": {"dp_MPa": {"type": "number", "unit": "MPa"}}}))
+    {
+     "type": "object",
+     "properties": {
+      "dp_MPa": {"type": "number", "unit": "MPa"}
+     }
+    }
+    """
+    inner = indent + " "
+    lines = []
+    for key, value in node.items():
+        if key in ("properties", "$defs"):  # named by what they describe
+            parts = (f"{inner} {dumps(name)}: {_of_part(part, inner + ' ')}" for name, part in value.items())
+            text = "{\n" + ",\n".join(parts) + f"\n{inner}}}"
+        else:
+            text = dumps(value)
+        lines.append(f"{inner}{dumps(key)}: {text}")
+    return "{\n" + ",\n".join(lines) + f"\n{indent}}}"
+
+
+def _of_part(part: Any, indent: str) -> str:
+    return one_line_a_field(part, indent) if "properties" in part else dumps(part)
 
 
 #: What a page asks for by ``<!-- made: NAME -->``.

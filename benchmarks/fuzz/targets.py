@@ -23,7 +23,7 @@ from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest, OutputManifest
 from dzdesign.design.signal_text import parse_signal
 from dzdesign.identify.reading.column_labels import find_columns, parse_columns
-from dzdesign.identify.reading.low_flow_table import read_low_flow
+from dzdesign.identify.reading.low_flow_readings import EXAMPLE, read_low_flow
 from dzdesign.identify.reading.ramp_files import read_ramp_file
 from dzdesign.identify.reading.text.table_reader import read_text_table
 from dzdesign.identify.valve.model import ValveModel
@@ -36,7 +36,6 @@ GOLDENS = Path(__file__).parents[2] / "tests" / "goldens"
 CSV = b"# bench 3\ntime_s;u [V];dP (bar);Q_Lmin\n" + b"".join(
     b"%d;%d,5;10;%d\n" % (n, n % 10, n % 7) for n in range(40)
 )
-LOW_FLOW = b"# by hand\nu_V,dP_MPa,Q [mL/min],Q_error [mL/min],branch\n4.9,1,12,1,rising\n4.8,1,8,1,falling\n"
 #: Artefacts beside valve.json and compensator.json.
 ARTEFACTS = (FirmwareManifest, OutputManifest, ValveManifest, Evidence, OutputEvidence, Assessment)
 
@@ -103,8 +102,7 @@ TARGETS = {
         run=_stored(read_ramp_file, "ramp.mat"), seeds=lambda: [CSV, b"PAR1", b"ARROW1", b"TDSm", b"MATLAB 5.0"]
     ),
     "low-flow": Target(
-        run=_stored(lambda path: read_low_flow(path, 10.0), "low.csv"),
-        seeds=lambda: [LOW_FLOW, LOW_FLOW.replace(b",", b";")],
+        run=lambda data: read_low_flow(data.decode("latin-1"), 10.0), seeds=lambda: [EXAMPLE.encode()]
     ),
     "valve": Target(
         run=lambda data: read_artefact(data, ValveModel, "valve.json"),

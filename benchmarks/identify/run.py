@@ -24,12 +24,12 @@ from curve_choice import print_curve_choice  # noqa: E402
 from curve_premises import print_curve_premises  # noqa: E402
 from measured import print_measured  # noqa: E402
 from meters import print_meters  # noqa: E402
-from planned_series import print_planned_series  # noqa: E402
 from ramp_series import print_ramp_series  # noqa: E402
 from random_valves import print_random_valves  # noqa: E402
 from reading import print_reading  # noqa: E402
 from recorded_premises import print_recorded_premises  # noqa: E402
 from scoreboard import run_parts  # noqa: E402
+from series_gain import print_series_gain  # noqa: E402
 from soft_edges import print_soft_edges  # noqa: E402
 from stops import print_stops  # noqa: E402
 from timing import print_timing  # noqa: E402
@@ -42,7 +42,7 @@ PARTS = {
     "residual": (print_residual, 303),
     "between-ramps": (print_between_ramps, 808),
     "ramp-series": (print_ramp_series, 818),
-    "planned": (print_planned_series, 828),
+    "series-gain": (print_series_gain, 828),
     "stops": (print_stops, 909),
     "meters": (print_meters, 1010),
     "corpus": (print_corpus, 909),

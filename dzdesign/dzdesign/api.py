@@ -5,7 +5,7 @@ Each function takes paths or the result of the previous stage. Options are writt
 ``output`` a function also writes the file or folder of the command of the same stage, byte for byte. Nothing is
 printed, and heavy packages are imported when a stage is called.
 
-`plan`, `init`, `simulate`, `assess`, `report`, `batch`, `calibration` and `export` correspond to the commands of
+`init`, `simulate`, `assess`, `report`, `batch`, `calibration` and `export` correspond to the commands of
 the same names; `read_calibration` corresponds to `calibration --read`.
 
 >>> from dzdesign import api
@@ -28,7 +28,6 @@ from dzdesign.stages import export as export_stage
 from dzdesign.stages import generate as generate_stage
 from dzdesign.stages import identify as identify_stage
 from dzdesign.stages import init as init_stage
-from dzdesign.stages import plan as plan_stage
 from dzdesign.stages import report as report_stage
 from dzdesign.stages import simulate as simulate_stage
 from dzdesign.stages import verify as verify_stage
@@ -36,7 +35,7 @@ from dzdesign.terminal.notebook import heading_of, html_of, text_of
 
 __all__ = [
     "DzdesignError", "InputError", "RequirementError",
-    "assess", "batch", "calibration", "design", "export", "generate", "identify", "init", "plan", "read_calibration",
+    "assess", "batch", "calibration", "design", "export", "generate", "identify", "init", "read_calibration",
     "report", "simulate", "verify",
 ]  # fmt: skip
 
@@ -49,7 +48,6 @@ def __dir__() -> list[str]:
 display_by(heading=heading_of, text=text_of, html=html_of)
 
 init = with_keywords(init_stage.InitArguments, init_stage.init)
-plan = with_keywords(plan_stage.PlanArguments, plan_stage.plan)
 identify = with_keywords(identify_stage.IdentifyArguments, identify_stage.identify)
 design = with_keywords(design_stage.DesignArguments, design_stage.design)
 generate = with_keywords(generate_stage.GenerateArguments, generate_stage.generate)

@@ -13,7 +13,7 @@ FOLDER = Path(bench_plant.__file__).parent
 PLANTS = {"bench_plant.py": set()}
 PLANTS |= {f"recordings/{name}.py": set() for name in ("bench_loggers", "corpus_plant", "four_port_plant")}
 CONTAINER = {"dzdesign.identify.reading.ramp_test"}
-PLANTS |= {"recorded_ramps.py": CONTAINER, "planned_bench.py": CONTAINER, "bench_model.py": CONTAINER}
+PLANTS |= {"recorded_ramps.py": CONTAINER, "series_bench.py": CONTAINER, "bench_model.py": CONTAINER}
 
 
 def of_the_product(text: str) -> set[str]:

@@ -12,7 +12,6 @@ import signal
 import sys
 from pathlib import Path
 
-from dzdesign.core import folder_swap as exchange
 from dzdesign.core.artefact_files import write_file, write_files, write_folder
 from dzdesign.core.errors import InputError
 
@@ -60,7 +59,6 @@ JOBS = {
     "plots": (old_plots, new_plots),
     "folder": (old_folder, new_folder),
     "first folder": (nothing, new_folder),
-    "folder in two steps": (old_folder, new_folder),
 }
 
 
@@ -104,8 +102,6 @@ def main() -> None:
     scratch = Path(sys.argv[1])
     place = scratch / "place"
     for name, (old, new) in JOBS.items():
-        if name == "folder in two steps":
-            exchange.exchanged = lambda *_: False
         trees = {}
         for which, jobs in (("old", [old]), ("new", [old, new])):
             place.mkdir()

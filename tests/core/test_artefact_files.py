@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from dzdesign.core import folder_swap as exchange
 from dzdesign.core.artefact_files import (
     MANIFEST_NAME,
     check_file_may_be_written,
@@ -209,7 +208,6 @@ def test_an_empty_folder_may_be_written_and_parents_are_made(tmp_path):
 )
 def test_a_folder_that_fails_half_way_leaves_the_old_one(folder, monkeypatch, calls_that_work, error, becomes):
     before = tree(folder)
-    monkeypatch.setattr(exchange, "exchanged", lambda *_: False)  # a system without the one step for both
     broken, real = failing(error, calls_that_work), os.replace
     calls = iter(range(10))
     # The call after the failing one brings the old folder back.

@@ -2,13 +2,14 @@
 
 import os
 import sys
+import time
 from pathlib import Path
 
 import pytest
 
 from dzdesign.core.artefact_files import MANIFEST_NAME, write_file, write_files, write_folder
 from dzdesign.core.errors import InputError
-from dzdesign.core.folder_swap import UNPLACED, alone_in
+from dzdesign.core.placing import ABANDONED_S, UNPLACED
 
 FILES = {"core/a.c": "int a;\n", "README.md": "read\n"}
 FIRMWARE = {"schema": "dzdesign.firmware/1", "target": "host"}
@@ -61,10 +62,7 @@ def test_the_names_of_new_folders_above_it_are_synced(tmp_path, steps):
         assert place.stat().st_ino in synced, place
 
 
-@pytest.mark.parametrize("in_one_step", [True, False])
-def test_what_lies_beside_a_folder_under_a_like_name_is_somebodys_own(tmp_path, monkeypatch, in_one_step):
-    if not in_one_step:
-        monkeypatch.setattr("dzdesign.core.folder_swap.exchanged", lambda *_: False)
+def test_what_lies_beside_a_folder_under_a_like_name_is_somebodys_own(tmp_path):
     notes = tmp_path / ".firmware.old" / "notes.txt"
     notes.parent.mkdir()
     notes.write_text("mine")
@@ -73,10 +71,7 @@ def test_what_lies_beside_a_folder_under_a_like_name_is_somebodys_own(tmp_path, 
     assert notes.read_text() == "mine" and sorted(os.listdir(tmp_path)) == [".firmware.old", "firmware"]
 
 
-@pytest.mark.parametrize("in_one_step", [True, False])
-def test_a_folder_may_have_the_longest_name(tmp_path, monkeypatch, in_one_step):
-    if not in_one_step:
-        monkeypatch.setattr("dzdesign.core.folder_swap.exchanged", lambda *_: False)
+def test_a_folder_may_have_the_longest_name(tmp_path):
     for text in ("old\n", "new\n"):
         write_folder(tmp_path / ("x" * 255), {**FILES, "README.md": text}, FIRMWARE)
     assert (tmp_path / ("x" * 255) / "README.md").read_text() == "new\n"
@@ -87,31 +82,8 @@ def test_a_replaced_folder_is_removed_only_after_the_new_name_is_on_the_disk(tmp
     write_folder(folder, FILES, FIRMWARE)
     monkeypatch.setattr("shutil.rmtree", lambda *_, **__: steps.append(("remove", 0)))
     write_folder(folder, {**FILES, "README.md": "new\n"}, FIRMWARE)
-    assert steps.index(("remove", 0)) > steps.index(("sync", tmp_path.stat().st_ino), len(steps) - 2)
-
-
-@pytest.mark.parametrize("left", [b"", b"\0" * 400])
-def test_a_folder_that_a_power_cut_erased_is_made_again(tmp_path, left):
-    folder = tmp_path / "firmware"
-    write_folder(folder, FILES, FIRMWARE)
-    for path in folder.rglob("*"):
-        if path.is_file():
-            path.write_bytes(left)
-    (folder / "notes.txt").write_text("mine")
-    write_folder(folder, FILES, FIRMWARE)
-    assert {name: (folder / name).read_text() for name in FILES} == FILES
-    assert (folder / "notes.txt").read_text() == "mine"
-
-
-def test_of_an_erased_folder_no_file_with_a_content_of_its_own_is_lost(tmp_path):
-    folder = tmp_path / "firmware"
-    write_folder(folder, FILES, FIRMWARE)
-    (folder / MANIFEST_NAME).write_bytes(b"")
-    (folder / "README.md").write_text("mine")
-    with pytest.raises(InputError, match=r"README\.md"):
-        write_folder(folder, FILES, FIRMWARE)
-    assert (folder / "README.md").read_text() == "mine"
-    assert not list(tmp_path.glob(f"{UNPLACED}*"))
+    new_name = steps.index(("rename", folder.stat().st_ino))
+    assert new_name < steps.index(("sync", tmp_path.stat().st_ino), new_name) < steps.index(("remove", 0))
 
 
 def test_a_folder_without_a_manifest_is_still_somebodys(tmp_path):
@@ -125,12 +97,16 @@ def test_a_folder_without_a_manifest_is_still_somebodys(tmp_path):
     lambda place: write_file(place / "valve.json", "{}"),
     lambda place: write_folder(place / "firmware", FILES, FIRMWARE),
 ])  # fmt: skip
-def test_what_a_killed_run_began_goes_with_the_next(tmp_path, write):
+def test_what_a_killed_run_began_goes_with_a_later_one(tmp_path, write):
     (tmp_path / f"{UNPLACED}0a1b").mkdir()
     (tmp_path / f"{UNPLACED}0a1b/half").write_text("half")
     (tmp_path / f"{UNPLACED}file").write_text("half")
+    (tmp_path / f"{UNPLACED}young").write_text("another process writes it")
+    long_ago = time.time() - 2 * ABANDONED_S
+    for name in ("0a1b", "file"):
+        os.utime(tmp_path / f"{UNPLACED}{name}", (long_ago, long_ago))
     write(tmp_path)
-    assert not list(tmp_path.glob(f"{UNPLACED}*"))
+    assert [path.name for path in tmp_path.glob(f"{UNPLACED}*")] == [f"{UNPLACED}young"]
 
 
 def test_the_artefact_that_a_link_leads_to_is_replaced_and_the_link_stays(tmp_path):
@@ -160,14 +136,7 @@ def test_a_read_only_file_that_windows_can_not_sync_is_carried_over(tmp_path, mo
             raise PermissionError(13, "Permission denied")
         return real(path, flags, *rest, **more)
 
-    monkeypatch.setattr("dzdesign.core.disk_sync.FOLDERS_OPEN", False)
+    monkeypatch.setattr("dzdesign.core.placing.FOLDERS_OPEN", False)
     monkeypatch.setattr(os, "open", windows)
     write_folder(folder, FILES, FIRMWARE)
     assert (folder / "object").read_text() == "mine"
-
-
-def test_a_folder_may_be_held_twice_by_one_thread(tmp_path):
-    with alone_in(tmp_path) as outer:
-        write_file(tmp_path / "batch.json", "{}")
-        with alone_in(tmp_path) as inner:
-            assert outer and inner

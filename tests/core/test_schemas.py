@@ -1,15 +1,13 @@
 """The JSON Schemas against the artefacts that the product writes: every key described, every fault seen."""
 
 import json
-import re
 from copy import deepcopy
 from dataclasses import replace
 
 import pytest
 from jsonschema import Draft202012Validator
 
-from dzdesign.command_line.cli import main
-from dzdesign.commands.schema import SCHEMAS, one_line_a_field, schema_document, schema_text
+from docs.generated import SCHEMAS, one_line_a_field, schema_document, schema_text
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.identify.options import IdentifyOptions
@@ -160,19 +158,6 @@ def test_a_key_that_no_schema_describes_is_seen(example_artefacts):
     document = {**example_artefacts["valve"], "colour": "red"}
     assert any("colour" in text for text in problems("valve", document))
     assert problems("valve", document, every_key_described=False) == [], "more keys are welcome"
-
-
-def test_the_command_prints_them(capsys):
-    assert main(["schema"]) == 0
-    listed = capsys.readouterr().out
-    assert re.findall(r"^([\w-]+)  ", listed, re.MULTILINE) == list(SCHEMAS)
-    assert main(["schema", "--json"]) == 0
-    assert [each["name"] for each in json.loads(capsys.readouterr().out)["schemas"]] == list(SCHEMAS)
-    for name in SCHEMAS:
-        assert main(["schema", name]) == 0
-        assert json.loads(capsys.readouterr().out) == schema_document(name)
-    assert main(["schema", "../valve"]) == 2 and main(["schema", "vavle"]) == 2
-    assert "did you mean 'valve'?" in capsys.readouterr().err
 
 
 #: The schemas, for review.

@@ -56,7 +56,6 @@ def firmware(run, folder):
 
 def test_the_command_line_knows_the_law(run):
     assert "scaled" in run("design", "--help")
-    assert "scaled" in run("completion", "bash")
     assert "did you mean 'scaled'?" in run("design", "valve.json", "--law", "scaledd", status=2)
 
 

@@ -9,9 +9,8 @@ from importlib import import_module
 
 import pytest
 
-from docs.generated import API, key_lines
+from docs.generated import API, SCHEMAS, key_lines, schema_document
 from dzdesign import api
-from dzdesign.commands.schema import SCHEMAS, schema_document
 from dzdesign.core.artefact_types import Artefact
 from dzdesign.verify import requirements
 from dzdesign.verify.requirements import Requirement

@@ -52,7 +52,7 @@ def test_the_api_writes_the_bytes_of_the_commands(ramps, tmp_path, monkeypatch, 
 
 
 def test_the_options_are_those_of_the_commands():
-    for command in ("plan", "init", "identify", "design", "codegen", "verify", "simulate", "assess", "report", "batch"):
+    for command in ("init", "identify", "design", "codegen", "verify", "simulate", "assess", "report", "batch"):
         function = getattr(api, "generate" if command == "codegen" else command)
         options = [argument.name for argument in arguments_of_command(command) if argument.name != "list_targets"]
         assert set(inspect.signature(function).parameters) == set(options)

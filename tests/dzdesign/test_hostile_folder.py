@@ -28,7 +28,6 @@ OF_ONE_INPUT = (
     "init {} -o {out}.toml",
     "identify {} -o {out}.json --u-max 10V",
     "identify {good} -o {out}.json --config {}",
-    "identify {good} -o {out}.json --low-flow {} --u-max 10V",
     "design {} -o {out}.json",
     "codegen {} -o {out}",
     "calibration {} -o {out}.hex",
@@ -38,7 +37,6 @@ OF_ONE_INPUT = (
     "batch {} -o {out} --jobs 1",
     "assess {} --after {} -o {out}.json",
     "report {} -o {out}.html",
-    "plan {}",
     "simulate --plant {} -o {out}",
     "load {} --port absent",
 )  # fmt: skip
@@ -127,7 +125,6 @@ OF_A_DAY = (
     ("report", "{out}", "-o", "{out}/report.html"),
     ("report", "{out}/lot", "-o", "{out}/lot.html"),
     ("simulate", "--dp", "1 MPa", "-o", "{out}/simulated"),
-    ("plan", "{out}/valve.json"),
     ("doctor",),
 )  # fmt: skip
 

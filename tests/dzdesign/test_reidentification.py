@@ -195,11 +195,13 @@ class TestWhatCanNotBeChecked:
 
 class TestOptionsOfEveryKind:
     def test_tables_order_and_parts_are_taken_again(self, ramps):
+        by_hand = "2.4 +- 0.1 L/min at 5.6 V, 3 MPa, closing"
         valve = api.identify(
-            [ramps / name for name in NAMES[::-1]], order=[NAMES[1], NAMES[0], NAMES[3], NAMES[2]],
-            from_={NAMES[0]: "1 s"}, units=["bar", "%"], meter_lag="0.1 s", confidence=0.95,
+            [ramps / name for name in NAMES[::-1]], low_flow=[by_hand], order=[NAMES[1], NAMES[0], NAMES[3], NAMES[2]],
+            from_={NAMES[0]: "1 s"}, missing=["OFF", "none"], meter_lag="0.1 s", confidence=0.95,
         )  # fmt: skip
-        assert valve.options.lists == {"order": (NAMES[1], NAMES[0], NAMES[3], NAMES[2]), "units": ("bar", "%")}
+        order = (NAMES[1], NAMES[0], NAMES[3], NAMES[2])
+        assert valve.options.lists == {"order": order, "missing": ("OFF", "none"), "low_flow": (by_hand,)}
         assert valve.options.tables == {"from_": {NAMES[0]: "1 s"}} and valve.options.texts["confidence"] == "0.95"
         check = tried(valve, in_folder(ramps))
         assert check.holds, check.text

@@ -34,11 +34,13 @@ LAG = ("--meter-lag", "0 s +- 0.02 s")
 OPENS, CLOSES = 4 + 1.6 * 4.66, 4 + 1.6 * 4.54
 
 
-def write_ramp(folder, name, dp, seed, command=None, scale=lambda u: 4 + 1.6 * u, gain=1.0, **options):
+def write_ramp(
+    folder, name, dp, seed, command=None, scale=lambda u: 4 + 1.6 * u, label="set (mA)", gain=1.0, **options
+):
     rows = bench(command or ramp(20.0), edge=dp, seed=seed, **options)
     rows["Q"] = gain * rows["Q"]
     path = folder / name
-    path.write_text(command_text(rows, "set (mA)", scale(rows["u"]), flow="gpm"), encoding="utf-8")
+    path.write_text(command_text(rows, label, scale(rows["u"]), flow="gpm"), encoding="utf-8")
     return str(path)
 
 
@@ -91,10 +93,9 @@ def test_the_files_stay_in_volts_and_say_what_is_shown(folder, printed):
     assert document["recorded_units"]["flow"]["factor"] == pytest.approx(1 / 3.785411784, rel=1e-11)
 
 
-def test_identify_plan_and_design_print_no_other_unit(folder, printed):
+def test_identify_and_design_print_no_other_unit(folder, printed):
     pages = {
         "identify": printed,
-        "plan": run("plan", folder / "valve.json", "--budget", "10 min")[1],
         "design": run("design", folder / "valve.json", "-o", folder / "compensator.json")[1],
     }
     for name, text in pages.items():
@@ -102,7 +103,6 @@ def test_identify_plan_and_design_print_no_other_unit(folder, printed):
         assert "bar" in text and "mA" in text and "gpm" in text, name
     row = next(line for line in printed.splitlines() if line.lstrip().startswith("r1_")).split()
     assert float(row[-7]) == pytest.approx(OPENS, abs=0.03) and float(row[-6]) == pytest.approx(CLOSES, abs=0.03)
-    assert re.search(r"4 to 20 mA in", pages["plan"])
     offsets = re.findall(r"^ +[\d.]+ +(1\d\.\d+) .*%$", pages["design"], re.MULTILINE)
     assert "offset (mA)" in pages["design"] and len(offsets) == 2
     assert all(4 < float(offset) < CLOSES for offset in offsets)
@@ -118,43 +118,25 @@ def test_the_premise_and_what_cannot_be_seen_too(folder, ramps):
     assert "below 0.100 gpm" in " ".join(reasons) and not any(map(numbers_as_computed, reasons))
 
 
-@pytest.fixture(scope="module")
-def chosen(folder, ramps):
-    """A valve recorded in mA, bar and gpm, whose engineer asked for other units."""
-    options = folder / "units.toml"
-    options.write_text('units = ["psi", "%", "mA", "L/h"]\n', encoding="utf-8")
-    words = ["identify", *ramps, "--columns", COLUMNS, *LAG, "-o", folder / "chosen.json", "--config", options]
-    status, text = run(*words)
-    assert status == 0, text
-    return text
-
-
-def test_what_the_engineer_asks_for_goes_before_what_was_recorded(folder, chosen):
-    compensator = folder / "chosen_compensator.json"
-    pages = {
-        "identify": chosen,
-        "plan": run("plan", folder / "chosen.json", "--budget", "10 min")[1],
-        "design": run("design", folder / "chosen.json", "-o", compensator)[1],
-    }
-    for name, text in pages.items():
-        assert not re.search(r"\d\s?(mV|V|MPa|L/min|bar|gpm)\b", re.sub(r"'[^']*'", "", text)), name
-        assert "psi" in text and "L/h" in text, name
-    assert run("plan", folder / "chosen.json", "--budget", "10 min", "--units", "bar")[1].count(" bar") == 2
-    assert json.loads((folder / "chosen.json").read_bytes())["sides"]["positive"]["tests"][0]["dp_MPa"] < 1.1
-
-
-def test_the_firmware_speaks_in_them(folder, chosen):
+def test_the_firmware_speaks_in_them(folder):
     """Comments of the C, and the README's table of signals: volts there are those at the pin alone."""
+    ramps = [
+        write_ramp(folder, f"percent_{dp:g}.csv", dp, int(10 * dp), scale=lambda u: 10 * u, label="set (%)")
+        for dp in (1.0, 4.0)
+    ]
+    words = ["identify", *ramps, "--columns", "u=set (%)", *LAG, "-o", folder / "percent.json"]
+    status, text = run(*words)
+    assert status == 0 and not numbers_as_computed(text), text
     compensator = folder / "for_firmware.json"
     options = ["--hysteresis", "play", "--pressure-b", "0..3 V = 25 MPa", "--output-max", "90 %"]
-    assert run("design", folder / "chosen.json", *options, "-o", compensator)[0] == 0
-    assert run("codegen", compensator, "-o", folder / "chosen_firmware")[0] == 0
-    for path in (folder / "chosen_firmware" / "core").iterdir():
+    assert run("design", folder / "percent.json", *options, "-o", compensator)[0] == 0
+    assert run("codegen", compensator, "-o", folder / "spoken_firmware")[0] == 0
+    for path in (folder / "spoken_firmware" / "core").iterdir():
         assert not numbers_as_computed(path.read_text(encoding="utf-8")), path.name
-    header = (folder / "chosen_firmware" / "core" / "dz_valve.h").read_text(encoding="utf-8")
-    assert "full command being 100 %" in header and " psi (the converter's code" in header
-    readme = (folder / "chosen_firmware" / "f28335" / "README.md").read_text(encoding="utf-8")
-    assert "| command u_i, 0 % to 100 % |" in readme and "| pressure A, 0 psi to 2900.75 psi |" in readme
+    header = (folder / "spoken_firmware" / "core" / "dz_valve.h").read_text(encoding="utf-8")
+    assert "full command being 100 %" in header and " bar (the converter's code" in header
+    readme = (folder / "spoken_firmware" / "f28335" / "README.md").read_text(encoding="utf-8")
+    assert "| command u_i, 0 % to 100 % |" in readme and "| pressure A, 0 bar to 200 bar |" in readme
     assert "| 50 %, 50 %" not in readme and "MPa" not in readme
 
 

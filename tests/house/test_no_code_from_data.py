@@ -19,7 +19,6 @@ STARTING = {f"subprocess.{name}" for name in ("Popen", "run", "call", "check_cal
 LOADING = ("ctypes", "cffi", "_ctypes", "numpy.ctypeslib", "np.ctypeslib")
 #: Where libraries are loaded: the system's own, and what is run as a process of its own.
 LOADS = {
-    "core/dzdesign/core/folder_swap.py",
     "dzdesign/dzdesign/batch/parent_watch.py",
     "verify/dzdesign/verify/toolchain/library_server.py",
 }

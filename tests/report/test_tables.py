@@ -7,8 +7,7 @@ from dataclasses import replace
 import pytest
 
 from dzdesign.codegen.project import target_named
-from dzdesign.core.chosen_units import read_units
-from dzdesign.core.recorded_units import AS_COMPUTED
+from dzdesign.core.recorded_units import AS_COMPUTED, PressureUnit
 from dzdesign.design.certificate import not_counted
 from dzdesign.design.designing import design
 from dzdesign.design.options import options_of
@@ -56,7 +55,7 @@ def test_every_component_stands_in_the_table_with_its_origin(machine, section):
 
 def test_a_sensitivity_times_its_half_width_is_the_contribution_in_any_units(machine, example_valve):
     """Seeded: of a half-width that is shown in bar the sensitivity per MPa would be ten times too large."""
-    chosen = read_units("bar", "--units").over(AS_COMPUTED, 10.0)
+    chosen = replace(AS_COMPUTED, pressure=PressureUnit(unit="bar", factor=10.0))
     of_bar = designed(replace(example_valve, recorded_units=chosen), DECLARED)
     for compensator, unit in ((machine, "MPa"), (of_bar, "bar")):
         table = budget_section(compensator).tables[0]

@@ -7,7 +7,7 @@ from typing import Any
 
 from jsonschema import Draft202012Validator
 
-from dzdesign.commands.schema import schema_document
+from docs.generated import schema_document
 
 #: Of no type that a schema here asks for beside "object" and "array".
 OTHER = {"string": 1.5, "number": "1", "integer": "1", "boolean": "true", "array": {}, "object": []}

@@ -14,7 +14,7 @@ from dzdesign.identify.knees.prepared_tests import found_floor, split_recordings
 from dzdesign.identify.ramps.pooling import SAME_PRESSURE, pool_ramps
 from dzdesign.identify.ramps.sides import tests_of_side
 from dzdesign.identify.reading.ramp_test import RampTest
-from dzdesign.identify.reading.units_of_columns import shown_units
+from dzdesign.identify.reading.units_of_columns import units_of
 from dzdesign.identify.valve.model import SIDES
 
 Pair = tuple[PressureCurves | None, PressureCurves | None]
@@ -53,11 +53,11 @@ class Comparison:
     @property
     def units(self) -> RecordedUnits:
         """The units in which results are shown."""
-        return shown_units([test for tests in self.tests.values() for test in tests], self.options.reading)
+        return units_of([test for tests in self.tests.values() for test in tests])
 
     def of_set(self, name: Set, side: Side) -> RecordedUnits:
         """Return the units in which what was found in one set is shown, of a side."""
-        return shown_units(self.tests[name], self.options.of_set(name)).of_side(side)
+        return units_of(self.tests[name]).of_side(side)
 
 
 def compare_curves(before: Sequence[RampTest], after: Sequence[RampTest], options: AssessOptions) -> Comparison:
@@ -76,7 +76,7 @@ def compare_curves(before: Sequence[RampTest], after: Sequence[RampTest], option
     try:
         return _compared(sets, options)
     except InputError as error:
-        raise InputError(in_units(error, shown_units([*before, *after], options.reading))) from error
+        raise InputError(in_units(error, units_of([*before, *after]))) from error
 
 
 def _compared(sets: Mapping[Set, Sequence[RampTest]], options: AssessOptions) -> Comparison:

@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dzdesign.core.disk_sync import make_folder, sync_file, sync_folder, sync_tree
 from dzdesign.core.documents import family_of, parse_document, sha256_of, sha256_of_file, sha256_of_octets, to_json
 from dzdesign.core.errors import InputError
 from dzdesign.core.folder_contents import (
@@ -20,10 +19,18 @@ from dzdesign.core.folder_contents import (
     check_inside,
     keep_filled_in,
     manifest_of,
-    refuse_to_replace_unknown,
 )
-from dzdesign.core.folder_swap import alone_in, beside, bring_back, put_in_place, remove_abandoned
 from dzdesign.core.input_files import json_object, open_bytes, read_bytes, reason_of
+from dzdesign.core.placing import (
+    beside,
+    bring_back,
+    make_folder,
+    put_in_place,
+    remove_abandoned,
+    sync_file,
+    sync_folder,
+    sync_tree,
+)
 from dzdesign.core.scratch import is_scratch
 from dzdesign.core.version import __version__
 
@@ -115,9 +122,8 @@ def write_file(path: Path, content: str | bytes, schema: str | None = None, opti
     with _refusing(f"'{path}'", option):
         # A link to an artefact stays, and its artefact is replaced; a link to anything else gives way.
         place = Path(os.path.realpath(path)) if schema else Path(path)
-        with alone_in(place.parent) as alone:
-            remove_abandoned(place.parent, alone=alone)
-            _replace_file(place, data)
+        remove_abandoned(place.parent)
+        _replace_file(place, data)
     note_written(path)
     logger.debug("wrote '%s', %d bytes", path, len(data))
 
@@ -160,9 +166,6 @@ def check_folder_may_be_written(folder: Path, schema: str | None = None) -> None
     """
     folder = Path(folder)
     with _refusing(f"the folder '{folder}'", "-o"):
-        if folder.absolute().parent.is_dir():
-            with alone_in(folder.absolute().parent):  # another process may be exchanging it
-                return _check_folder(folder, schema)
         _check_folder(folder, schema)
 
 
@@ -196,7 +199,7 @@ def write_folder(
     manifest : Artefact or mapping
         Written as `MANIFEST_NAME`.
     check : callable
-        Refuses what lies in the folder, while no other dzdesign can put anything else there.
+        Refuses what lies in the folder, just before it is replaced.
 
     Returns
     -------
@@ -218,12 +221,11 @@ def write_folder(
         if not folder.parent.is_dir():
             _check_folder(folder, document.get("schema"))
         make_folder(folder.parent)
-        with alone_in(folder.parent) as alone:
-            remove_abandoned(folder.parent, alone=alone)
-            bring_back(folder)
-            check()
-            _check_folder(folder, document.get("schema"))
-            kept = _replace_folder(folder, contents, listing, board_of(document))
+        remove_abandoned(folder.parent)
+        bring_back(folder)
+        check()
+        _check_folder(folder, document.get("schema"))
+        kept = _replace_folder(folder, contents, listing, board_of(document))
     note_written(named)
     logger.debug("wrote '%s', %d files", folder, len(contents))
     return kept
@@ -239,8 +241,6 @@ def _replace_folder(
         kept = {}
         if folder.is_dir():
             old = manifest_of(folder)
-            if old is None:  # empty, or as a power cut left it
-                refuse_to_replace_unknown(folder, contents)
             kept = keep_filled_in(folder, staging, old, listing, board) if old else {}
             carry_over(folder, staging, set(old["files"]) if old else set(contents))
         if durable := not is_scratch(folder):
@@ -249,8 +249,8 @@ def _replace_folder(
             put_in_place(staging, folder)
         else:
             os.replace(staging, folder)
-        if durable:  # before what stood there is removed: the removal must not reach the disk alone
-            sync_folder(folder.parent)
+            if durable:
+                sync_folder(folder.parent)
         return kept
     finally:
         shutil.rmtree(staging, ignore_errors=True)

@@ -1,4 +1,4 @@
-"""JSON Schema of a type: what `dzdesign schema` prints, and what a message says was expected."""
+"""JSON Schema of a type: what the page of the files shows, and what a message says was expected."""
 
 from collections.abc import Iterator
 from dataclasses import fields

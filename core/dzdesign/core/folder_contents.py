@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
 
-from dzdesign.core.documents import PIECE, family_of, sha256_of_file
+from dzdesign.core.documents import family_of, sha256_of_file
 from dzdesign.core.errors import InputError
 from dzdesign.core.input_files import MOST_DOCUMENT, json_object, reason_of
 
@@ -64,8 +64,6 @@ def check_folder_is_ours(folder: Path, schema: str | None) -> None:
     """Refuse a folder that dzdesign did not make, that holds another kind of artefact, or a file that would be lost."""
     manifest = manifest_of(folder)
     if manifest is None:
-        if _is_erased(folder / MANIFEST_NAME):
-            return
         raise InputError(
             f"'{folder}' is not empty and was not made by dzdesign, so it is left alone; choose a new folder with -o"
         )
@@ -74,29 +72,6 @@ def check_folder_is_ours(folder: Path, schema: str | None) -> None:
             f"'{folder}' holds {manifest['schema']}, which {schema} would replace; choose a new folder with -o"
         )
     _refuse_to_lose(folder, set(_changed_in(folder, manifest)) - board_of(manifest))
-
-
-def _is_erased(path: Path) -> bool:
-    """Tell a file whose content a power cut took: its name reached the disk, its bytes did not."""
-    if path.is_symlink() or not path.is_file():
-        return False
-    with open(path, "rb") as file:
-        return not any(piece.strip(b"\0") for piece in iter(lambda: file.read(PIECE), b""))
-
-
-def refuse_to_replace_unknown(folder: Path, contents: Mapping[str, bytes]) -> None:
-    """Refuse to overwrite files of a folder whose manifest a power cut erased, unless they are erased or identical."""
-    for name, data in contents.items():
-        path = folder / name
-        if os.path.lexists(path) and not _is_erased(path) and not _holds(path, data):
-            raise InputError(
-                f"a power cut erased '{folder / MANIFEST_NAME}', so nobody knows who wrote '{path}'; "
-                "move that file away, or choose a new folder with -o"
-            )
-
-
-def _holds(path: Path, data: bytes) -> bool:
-    return path.is_file() and path.stat().st_size == len(data) and path.read_bytes() == data
 
 
 def _refuse_to_lose(folder: Path, changed: set[str]) -> None:

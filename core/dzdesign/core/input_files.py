@@ -1,4 +1,4 @@
-"""Reading of user files: each is opened or read, or one sentence says why not, without hanging or unbounded memory.
+"""Reading of user files: each is opened or read, or one sentence says why not, without unbounded memory.
 
 What is no regular file can be read only once. A pipe is held in memory, `MOST_PIPED` bytes of it; a device is refused,
 for it may have no end.
@@ -10,7 +10,6 @@ import json
 import logging
 import os
 import stat
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -24,11 +23,6 @@ MOST_DOCUMENT = 1 << 24
 MOST_RECORDING = 1 << 30
 #: Largest recording from a pipe.
 MOST_PIPED = 1 << 28
-#: Address space in MiB in which every command has run, with recordings of some MB; most of it is only reserved.
-NEEDED_MIB = 1800
-#: A pipe that gives nothing for so long has nobody at its other end.
-PIPE_PATIENCE_S = 30.0
-PIECE = 1 << 20
 
 logger = logging.getLogger(__name__)
 
@@ -71,20 +65,6 @@ def json_object(path: Path) -> dict[str, Any] | None:
     return document if isinstance(document, dict) else None
 
 
-def check_address_space(what: str, needed_MiB: int = NEEDED_MIB) -> None:
-    """Refuse work for which this process is not given enough address space, as by ``ulimit -v``; `what` names it."""
-    try:
-        import resource
-    except ImportError:  # Windows has no such limit
-        return
-    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
-    if limit != resource.RLIM_INFINITY and limit < needed_MiB << 20:
-        raise InputError(
-            f"{what} needs {needed_MiB} MiB of address space, and this process is limited to {limit >> 20} MiB; raise "
-            "the limit (ulimit -v)"
-        )
-
-
 def reason_of(error: OSError | ValueError) -> str:
     """Return why a file can't be read or written: the system's own words, where it has some."""
     if isinstance(error, ValueError) and "embedded null" in str(error):  # each version of Python words it otherwise
@@ -125,41 +105,27 @@ def _stamp(file: BinaryIO) -> tuple[int, int]:
 
 
 def _is_pipe(path: Path, what: str) -> bool:
-    """Tell a pipe from a regular file; refuse what is neither."""
+    """Tell a shell's pipe, as of ``<(zcat a.gz)``, from a regular file; refuse what is neither.
+
+    A pipe with a name in a folder may have nobody at its other end, and whoever opens it waits for ever.
+    """
     mode = os.stat(path).st_mode
     if stat.S_ISREG(mode) or stat.S_ISDIR(mode):  # opening a folder says that it is one
         return False
-    if stat.S_ISFIFO(mode):
+    if stat.S_ISFIFO(mode) and os.fspath(path).startswith(("/dev/", "/proc/")):
         return True
-    raise InputError(f"{what} '{path}' is a device or a socket, expected a file")
+    raise InputError(f"{what} '{path}' is a device, a pipe or a socket, expected a file")
 
 
 def _piped(path: Path, what: str, most: int) -> bytes:
     """Return what a pipe gives until its end."""
-    if os.name != "posix":
-        return Path(path).read_bytes()
-    import select
-
-    pieces: list[bytes] = []
-    size = 0
-    # Opened without waiting for a writer, so that the wait can have an end.
-    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
-    try:
-        end = time.monotonic() + PIPE_PATIENCE_S
-        while select.select([descriptor], [], [], max(end - time.monotonic(), 0))[0]:
-            piece = os.read(descriptor, PIECE)
-            if not piece:
-                return b"".join(pieces)
-            pieces.append(piece)
-            size += len(piece)
-            if size > most:
-                raise InputError(
-                    f"{what} '{path}' is a pipe with more than {most >> 20} MiB; write that to a file and give the file"
-                )
-            end = time.monotonic() + PIPE_PATIENCE_S
-    finally:
-        os.close(descriptor)
-    raise InputError(f"{what} '{path}' is a pipe that gave nothing for {PIPE_PATIENCE_S:g} s; check who writes into it")
+    with open(path, "rb") as pipe:
+        content = pipe.read(most + 1)
+    if len(content) > most:
+        raise InputError(
+            f"{what} '{path}' is a pipe with more than {most >> 20} MiB; write that to a file and give the file"
+        )
+    return content
 
 
 @contextlib.contextmanager

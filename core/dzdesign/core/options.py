@@ -1,6 +1,6 @@
 """How an option is declared: once, as an annotated field of a frozen dataclass of arguments.
 
-Command line, options file, keywords of `dzdesign.api`, help, shell completion and reference pages are made of it.
+Command line, options file, keywords of `dzdesign.api`, help and reference pages are made of it.
 
 >>> from typing import Annotated
 >>> from dzdesign.core.option_readers import quantity
@@ -31,10 +31,10 @@ Texts = str | Iterable[str]
 Table = str | Mapping[str, str] | None
 
 #: Headings of the help, in their order; an option without one stands above them.
-EXPECTED, RECORDINGS, METER, FIT, LAW = "expected valve", "recordings", "flow meter", "fit", "law"
+RECORDINGS, METER, FIT, LAW = "recordings", "flow meter", "fit", "law"
 CONNECTIONS, DRIVE, CHECKS = "connections of the firmware", "drive functions", "further checks"
 MACHINE, OUTPUTS = "machine", "outputs other than a C firmware"
-GROUPS = (EXPECTED, RECORDINGS, METER, FIT, LAW, CONNECTIONS, DRIVE, MACHINE, OUTPUTS, CHECKS)
+GROUPS = (RECORDINGS, METER, FIT, LAW, CONNECTIONS, DRIVE, MACHINE, OUTPUTS, CHECKS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,8 +53,8 @@ class Option:
     read: Callable[[Any, str], Any] | None = None
     #: What stands for an option that was not given on the command line, where Python has another default.
     command_default: str = ""
-    #: Words that the option takes; where these are costly to import, their place as ``module:NAME``.
-    choices: tuple[str, ...] | str = ()
+    #: Words that the option takes, for its help.
+    choices: tuple[str, ...] = ()
     #: Spelling of one letter on the command line, such as ``-o``.
     short: str = ""
     #: The command line names it although Python takes it by position.
@@ -113,7 +113,7 @@ class Argument:
 
     def described(self, default: str) -> str:
         """Return the help with the words that it takes and its default, both in its first sentence."""
-        words = self.option.choices if isinstance(self.option.choices, tuple) else ()
+        words = self.option.choices
         notes = [", ".join(words)] if any(word not in self.help for word in words) else []
         notes += [f"default: {default}"] if default else []
         first, stop, others = self.help.partition(". ")

@@ -1,6 +1,6 @@
 """The units in which a person sees what is computed in V, MPa, L/min and A; converted here only.
 
-They are those of the recordings, unless `--units` names others (`dzdesign.core.chosen_units`).
+They are those of the recordings.
 
 A number in a text is written with a format and the unit in which it is computed, as in ``{knee:.3f V}``.
 `RecordedUnits` turns it into the unit of the recordings, and the decimals into those of the same significance.

@@ -195,7 +195,7 @@ class DesignChoices:
     """Change of the threshold by ageing, relative to its value (default: 0.5 %)."""
     law: Annotated[Text, Option("LAW", LAW, "paper", choices=LAW_NAMES)] = None
     """Law of the compensator. `dzdesign derive` states each law."""
-    guard: Annotated[Text, Option("G", LAW, "closing", choices="dzdesign.design.options:GUARDS")] = None
+    guard: Annotated[Text, Option("G", LAW, "closing")] = None
     """Threshold that the certificate protects: closing, mean or opening."""
     transition: Annotated[Text, Option("C", LAW, "auto", example="1 %", read=_transition)] = None
     """Share of the command, behind the zero band, over which the drive runs from the closing threshold to the opening
@@ -216,7 +216,7 @@ class DesignChoices:
         Text, Option("C", LAW, "100 %", example="95 %", read=share(Fraction(1), or_zero=False))
     ] = None
     """Largest drive, in percent of full drive."""
-    accept: Annotated[Text, Option("CODE", LAW, choices="dzdesign.design.options:ACCEPTABLE")] = None
+    accept: Annotated[Text, Option("CODE", LAW)] = None
     """Warnings to accept, separated by commas (default: none, the design is refused). branch-order: the valve seems to
     close above its opening threshold. broken-sensor: a failure of a pressure signal raises the offset undetected."""
     command_signal: Annotated[Text, Option("S", CONNECTIONS, example="0..10 V x 0.3")] = None

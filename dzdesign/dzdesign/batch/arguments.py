@@ -6,8 +6,7 @@ from typing import Annotated
 from dzdesign.core.option_readers import whole_number
 from dzdesign.core.options import AnyPath, Option, Text
 from dzdesign.design.design_choices import DesignChoices
-from dzdesign.stages.design import TARGETS
-from dzdesign.stages.generate import FORMS, OutputChoices
+from dzdesign.stages.generate import OutputChoices
 from dzdesign.stages.identify import IdentifyChoices
 
 
@@ -38,8 +37,8 @@ class BatchArguments(OutputChoices, DesignChoices, IdentifyChoices):
     outputs: Annotated[Text, Option("NAMES")] = None
     """Outputs for each valve in addition to its firmware, separated by commas: iec61131, fmu, matlab,
     amplifier."""
-    calibration: Annotated[Text, Option("FORM", choices=FORMS)] = None
+    calibration: Annotated[Text, Option("FORM")] = None
     """Form of a valve's numbers (default: fixed). fixed: in a firmware for each valve. block: in a calibration block
     for one firmware of the lot; each block is tried on every input."""
-    target: Annotated[str, Option("NAME", choices=TARGETS)] = "f28335"
+    target: Annotated[str, Option("NAME")] = "f28335"
     """Microcontroller. `codegen --list-targets` lists them."""

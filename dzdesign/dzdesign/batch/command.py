@@ -20,7 +20,6 @@ from dzdesign.batch.valves import Valve, valves_of
 from dzdesign.core.artefact_files import MANIFEST_NAME, read_bytes, write_file, write_files
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
-from dzdesign.core.folder_swap import alone_in
 from dzdesign.core.input_files import read_recording
 from dzdesign.core.options import arguments_of, paths_of, read_options
 from dzdesign.design.design_choices import DEFAULTS, DesignChoices
@@ -68,6 +67,31 @@ def calibrate_lot(args: BatchArguments) -> LotSummary:
 
 
 @contextlib.contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    """Hold a folder by a lock that goes with the process, however it ends; a BlockingIOError where another holds it.
+
+    Windows, some file systems of networks, and folders that can't be listed have no such lock.
+    """
+    try:
+        import fcntl
+
+        descriptor = os.open(folder, os.O_RDONLY)
+    except (ImportError, PermissionError):
+        yield
+        return
+    try:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise
+        except OSError:
+            pass
+        yield
+    finally:
+        os.close(descriptor)
+
+
+@contextlib.contextmanager
 def _taken(output: Path) -> Iterator[None]:
     """Keep a second batch out of the folder, and say of a full disk what to do.
 
@@ -76,8 +100,8 @@ def _taken(output: Path) -> Iterator[None]:
     """
     with contextlib.ExitStack() as stack:
         try:
-            stack.enter_context(alone_in(output))
-        except OSError as error:
+            stack.enter_context(_locked(output))
+        except BlockingIOError as error:
             raise InputError(
                 f"another batch is writing into '{output}'; wait until it has ended, or choose another folder with -o"
             ) from error

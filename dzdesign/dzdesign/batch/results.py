@@ -9,8 +9,8 @@ from dzdesign.batch.calibration import Outcome
 from dzdesign.batch.valve_folders import ValveFolder, read_valve_folder
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of, write_file, write_folder
 from dzdesign.core.artefact_types import THIS_TOOL, to_json_bytes
-from dzdesign.core.disk_sync import make_folder
 from dzdesign.core.errors import InputError
+from dzdesign.core.placing import make_folder
 from dzdesign.design.compensator import Compensator
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.lot.folder import is_lot

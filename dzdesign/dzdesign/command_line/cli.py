@@ -13,8 +13,6 @@ from dzdesign.core.errors import DzdesignError, InternalError, RequirementError,
 
 #: What the system says of an output that takes no more: full, beyond a quota, closed, a device that fails.
 UNPRINTABLE = (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC), errno.EBADF, errno.EIO, errno.EFBIG)
-#: Address space in MiB below which the libraries of linear algebra end the process without a word of ours.
-LEAST_MIB = 580
 DOES_NOT_HOLD, BAD_INPUT, INTERRUPTED, PIPE_CLOSED = 1, 2, 130, 141
 
 
@@ -40,11 +38,9 @@ def main(argv: list[str] | None = None) -> int:
             return 0
         from dzdesign.command_line.invocation import parse
         from dzdesign.command_line.parser import command_module
-        from dzdesign.core.input_files import check_address_space
         from dzdesign.terminal.progress import reporting
 
         call = parse(argv)
-        check_address_space("dzdesign", LEAST_MIB)
         with reporting(quiet=call.quiet, verbose=call.verbose):
             status: int = command_module(call.command).run(call.arguments, call.json)
             sys.stdout.flush()  # what can't be printed is said here and not when Python ends

@@ -1,4 +1,5 @@
-"""The commands: group and help line in `dzdesign --help`; a module of `dzdesign.commands` bears each one's name.
+"""The commands: group and help line in `dzdesign --help`; a module of `dzdesign.commands` bears each one's
+name, or a row of `dzdesign.commands.relays`.
 
 Such a module has ``Arguments``, a dataclass of `dzdesign.core.options`, ``EXAMPLES``, lines for the help, and
 ``run(arguments, json)``, which returns the exit status. `dzdesign --help` imports this module and no command's.
@@ -17,7 +18,6 @@ class Command(NamedTuple):
 PIPELINE, EVIDENCE, SETUP = "from ramps to firmware", "evidence", "getting started and diagnostics"
 
 COMMANDS = {
-    "plan": Command(PIPELINE, "plan a test series: pressures, ramp times, repeats and the predicted error"),
     "init": Command(PIPELINE, "inspect recordings and write a commented dzdesign.toml"),
     "identify": Command(PIPELINE, "fit the valve to its ramp tests: gain, thresholds and beta(dP), in valve.json"),
     "design": Command(PIPELINE, "compute the certified law with exact coefficients, in compensator.json"),
@@ -35,8 +35,6 @@ COMMANDS = {
     "monitor": Command(SETUP, "record the telemetry of a running firmware as a ramp file"),
     "load": Command(SETUP, "load a calibration block into an amplifier over its serial line"),
     "doctor": Command(SETUP, "list compilers, simulators and packages, and how to install what is missing"),
-    "schema": Command(SETUP, "print the JSON Schema of an artefact: its keys, their meaning and units"),
-    "completion": Command(SETUP, "print the script with which a shell completes commands and options"),
 }
 #: Of the front page.
 EXAMPLES = (

@@ -8,12 +8,15 @@ from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from types import ModuleType
-from typing import Annotated, Any, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 from dzdesign.command_line.command_table import COMMANDS, EXAMPLES
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.options import GROUPS, Argument, Option, arguments_of
 from dzdesign.core.version import __version__
+
+if TYPE_CHECKING:
+    from dzdesign.commands.relays import Relay
 
 #: The widest that help is set, in columns: longer lines are hard to read.
 WIDEST = 100
@@ -94,8 +97,12 @@ class FrontParser(Parser):
 
 
 @cache
-def command_module(name: str) -> ModuleType:
-    """Return the module that has a command's ``Arguments``, ``EXAMPLES`` and ``run``."""
+def command_module(name: str) -> "ModuleType | Relay":
+    """Return what has a command's ``Arguments``, ``EXAMPLES`` and ``run``: its module, or its row of the relays."""
+    from dzdesign.commands.relays import RELAYS
+
+    if name in RELAYS:
+        return RELAYS[name]
     return import_module(f"dzdesign.commands.{name}")
 
 

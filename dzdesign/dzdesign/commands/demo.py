@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Annotated
 
 from dzdesign.core.artefact_files import TOOL, check_folder_may_be_written, write_folder
-from dzdesign.core.disk_sync import make_folder
 from dzdesign.core.errors import InputError
 from dzdesign.core.options import AnyPath, Option
+from dzdesign.core.placing import make_folder
 from dzdesign.example import example_folder
 from dzdesign.stages.design import DesignArguments, design
 from dzdesign.stages.generate import GenerateArguments, generate

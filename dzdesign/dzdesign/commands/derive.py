@@ -17,7 +17,7 @@ EXAMPLES = ("dzdesign derive --equation 18", "dzdesign derive --format html -o d
 class Arguments:
     """Arguments of `derive`."""
 
-    format: Annotated[str, Option("F", choices="dzdesign.derivation.presentation.report:FORMATS")] = "text"
+    format: Annotated[str, Option("F")] = "text"
     """Output format: text, json or html."""
     equation: Annotated[Texts, Option("N")] = ()
     """Number of an equation to print with its premises, such as 18 or T3b. Repeatable."""

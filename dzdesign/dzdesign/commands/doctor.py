@@ -4,8 +4,9 @@ import platform
 import re
 import subprocess
 import sys
-from collections.abc import Callable
 from dataclasses import dataclass
+from operator import attrgetter
+from typing import NamedTuple
 
 from dzdesign.core.errors import DzdesignError
 from dzdesign.core.processes.programs import find_program
@@ -17,8 +18,7 @@ TINY = "#include <stdint.h>\nint32_t dz_tiny(int32_t a);\nint32_t dz_tiny(int32_
 PATIENCE_S = 20
 
 
-@dataclass(frozen=True, slots=True)
-class Tool:
+class Tool(NamedTuple):
     """A program that dzdesign can use: what it is for, where it comes from, and how it says its version."""
 
     name: str
@@ -59,40 +59,40 @@ class Arguments:
     """Arguments of `doctor`: none."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Installation:
-    """What is installed: paths and versions of programs and packages, None where there is none."""
-
-    dzdesign: str | None
-    python: str
-    system: str
-    #: Whether a program was compiled and answered, and by which compiler or why not.
-    compiles: bool
-    compiler: str
-    programs: dict[str, dict[str, str] | None]
-    packages: dict[str, str | None]
-    to_get: list[Tool]
-    holds: bool
-
-
 def run(arguments: Arguments, json: bool) -> int:
     """Print what is there; 1 if no C compiler works, for then nothing can be verified."""
     programs = {tool.name: _found(tool) for tool in (*COMPILERS, *OPTIONAL)}
     packages = _packages()
-    works, compiler = _compiles()
+    compiles, compiler = _compiles()
     missing = [name for name, version in packages.items() if version is None and name != "ziglang"]
     one_is_there = any(programs[tool.name] for tool in COMPILERS)  # which is enough
-    wanted = OPTIONAL if one_is_there else (*COMPILERS, *OPTIONAL)
-    found = Installation(
-        dzdesign=_version("dzdesign"), python=platform.python_version(), system=platform.platform(), compiles=works,
-        compiler=compiler, programs=programs, packages=packages, holds=works and not missing,
-        to_get=[tool for tool in wanted if not programs[tool.name]],
-    )  # fmt: skip
+    to_get = [tool for tool in (OPTIONAL if one_is_there else (*COMPILERS, *OPTIONAL)) if not programs[tool.name]]
+    about = {"dzdesign": _version("dzdesign"), "python": platform.python_version(), "system": platform.platform()}
     if json:
-        print_json(found)
-    else:
-        _print(found, missing)
-    return 0 if found.holds else 1
+        print_json({
+            **about, "compiles": compiles, "compiler": compiler, "programs": programs, "packages": packages,
+            "to_get": [tool._asdict() for tool in to_get], "holds": compiles and not missing,
+        })  # fmt: skip
+        return 0 if compiles and not missing else 1
+    console = new_console()
+    put_line(console, "dzdesign {dzdesign}, Python {python}, {system}".format_map(about))
+    versions = {name: (found or {"version": "not found"})["version"] or "found" for name, found in programs.items()}
+    put_rows(
+        console, "Programs", (*COMPILERS, *OPTIONAL),
+        {"program": lambda tool: tool.name, "version": lambda tool: versions[tool.name], "for": lambda t: t.purpose},
+        words=(0, 1, 2),
+    )  # fmt: skip
+    listed = ", ".join(f"{name} {version or 'MISSING'}" for name, version in packages.items())
+    put_line(console, f"Python packages: {listed.replace('ziglang MISSING', 'ziglang (optional) not there')}")
+    if to_get:
+        sources = {"program": "name", "Debian, Ubuntu": "debian", "macOS": "macos", "Windows": "windows"}
+        columns = {heading: attrgetter(field) for heading, field in sources.items()}
+        put_rows(console, "How to get the rest", to_get, columns, words=(0, 1, 2, 3))
+    if missing:
+        put_line(console, f"Missing packages: {sys.executable} -m pip install {' '.join(missing)}")
+    works = f"A library was compiled, loaded and called with {compiler}: verify can run."
+    put_line(console, works if compiles else f"NO C COMPILER WORKS: {compiler}")
+    return 0 if compiles and not missing else 1
 
 
 def _found(tool: Tool) -> dict[str, str] | None:
@@ -143,30 +143,3 @@ def _compiles() -> tuple[bool, str]:
     except (DzdesignError, OSError) as error:
         return False, str(error)
     return (True, compiler) if answer == 42 else (False, f"{compiler}: its program counts 3 * 14 = {answer}")
-
-
-def _print(found: Installation, missing: list[str]) -> None:
-    console = new_console()
-    put_line(console, f"dzdesign {found.dzdesign}, Python {found.python}, {found.system}")
-    programs: dict[str, Callable[[Tool], str]] = {
-        "program": lambda tool: tool.name,
-        "version": lambda tool: (found.programs[tool.name] or {"version": "not found"})["version"] or "found",
-        "for": lambda tool: tool.purpose,
-    }
-    put_rows(console, "Programs", (*COMPILERS, *OPTIONAL), programs, words=(0, 1, 2))
-    versions = ", ".join(f"{name} {version or 'MISSING'}" for name, version in found.packages.items())
-    put_line(console, f"Python packages: {versions.replace('ziglang MISSING', 'ziglang (optional) not there')}")
-    sources: dict[str, Callable[[Tool], str]] = {
-        "program": lambda tool: tool.name,
-        "Debian, Ubuntu": lambda tool: tool.debian,
-        "macOS": lambda tool: tool.macos,
-        "Windows": lambda tool: tool.windows,
-    }
-    if found.to_get:
-        put_rows(console, "How to get the rest", found.to_get, sources, words=(0, 1, 2, 3))
-    if missing:
-        put_line(console, f"Missing packages: {sys.executable} -m pip install {' '.join(missing)}")
-    if found.compiles:
-        put_line(console, f"A library was compiled, loaded and called with {found.compiler}: verify can run.")
-    else:
-        put_line(console, f"NO C COMPILER WORKS: {found.compiler}")

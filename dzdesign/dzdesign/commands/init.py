@@ -6,10 +6,8 @@ import shlex
 
 from dzdesign.core.errors import one_line
 from dzdesign.core.options import paths_of
-from dzdesign.initial_options.guided import init_by_questions
 from dzdesign.stages.init import InitArguments, init
 from dzdesign.terminal.page import print_json
-from dzdesign.terminal.questions import may_ask
 
 Arguments = InitArguments
 EXAMPLES = ("dzdesign init ramps/*.csv", "dzdesign init ramps/*.tdms -o bench2.toml")
@@ -25,8 +23,7 @@ PLAIN = re.compile(r"[\w ./*?:\[\],+@%=-]*")
 
 def run(arguments: Arguments, json: bool) -> int:
     """Write the options file; 1 if it leaves something open without which `identify` can't run."""
-    asked = not json and may_ask()
-    proposal = init_by_questions(arguments) if asked else init(arguments)
+    proposal = init(arguments)
     output = os.fspath(arguments.output or "")
     if json:
         keys = ("labels", "columns", "dp", "u_max_V", "u_seen_V", "valve")
@@ -37,7 +34,7 @@ def run(arguments: Arguments, json: bool) -> int:
             "open": proposal.opens,
         })  # fmt: skip
         return 1 if proposal.opens else 0
-    for line in (*(() if asked else proposal.seen), *(f"open: {line}" for line in proposal.opens)):
+    for line in (*proposal.seen, *(f"open: {line}" for line in proposal.opens)):
         print(one_line(line))
     if proposal.opens and proposal.u_seen_V is None:
         print(NOT_LOOKED_AT)

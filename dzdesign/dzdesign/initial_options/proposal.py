@@ -12,7 +12,6 @@ from dzdesign.core.errors import InputError, one_line
 from dzdesign.core.options import Paths, Table, paths_of
 from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.core.strict_templates import strict_templates
-from dzdesign.core.units import parse_quantity
 from dzdesign.stages.recordings import distinct_names, expand, read_recordings, refuse_copies
 from dzdesign.terminal.progress import say, stage_progress, with_bar
 
@@ -52,24 +51,6 @@ class Proposal:
     u_seen_V: float | None
     #: What `identify` finds; None while something is open.
     valve: "ValveModel | None"
-    #: What a person may be asked: columns that are unclear, with the reason; how the first file's columns may be read;
-    #: files without a pressure drop, with what their names may say; whether full command is a guess.
-    unclear: dict[str, str]
-    look: "ProposedColumns"
-    unknown_dp: dict[str, tuple[str, ...]]
-    guessed_dp: str
-    u_max_is_guess: bool
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Declared:
-    """What a person said that the recordings can't tell, as text with a unit; empty where nothing was said."""
-
-    u_max: str = ""
-    meter_floor: str = ""
-    meter_lag: str = ""
-    #: Pressure drop of recordings, by their names.
-    dp: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,13 +63,13 @@ class _Remarks:
 
 def propose(
     ramps: Paths, *, columns: Table, dp: Table, sample_rate: str | None = None, skip_rows: int | None = None,
-    missing: Sequence[str] = (), declared: Declared | None = None,
+    missing: Sequence[str] = (),
 ) -> Proposal:  # fmt: skip
     """Look at recordings, and return the file of options that this gives."""
     from dzdesign.identify.reading.column_labels import PER_CENT, parse_columns
     from dzdesign.identify.reading.proposed_columns import propose_columns
 
-    patterns, remarks, declared = paths_of(ramps), _Remarks(), declared or Declared()
+    patterns, remarks = paths_of(ramps), _Remarks()
     paths = expand(patterns) if patterns else _found_recordings()
     given = parse_columns(columns) if columns else {}
     looks = [
@@ -98,12 +79,9 @@ def propose(
     chosen, unclear = _columns_of_all(looks, given, bool(dp), remarks)
     guessed_dp = chosen.get("dP", "") if "dP" not in given else ""
     table, readings = _pressure_table(
-        distinct_names(paths), looks, dp, declared.dp, bool(guessed_dp or "dP" in unclear), remarks
+        distinct_names(paths), looks, dp, bool(guessed_dp or "dP" in unclear), remarks
     )
-    has_dp = bool(guessed_dp or "dP" in unclear or table or any(look.has_dp for look in looks))
-    is_unknown = len(paths) == 1 and not has_dp
-    u_max = parse_quantity(declared.u_max, "voltage", "full command") if declared.u_max else 10.0
-    u_seen, valve = None, None
+    u_max, u_seen, valve = 10.0, None, None
     in_per_cent = "u" not in unclear and any(
         (look.known | look.proposed)["u"].unit.lower().endswith(PER_CENT) for look in looks
     )
@@ -112,25 +90,22 @@ def propose(
             paths, u_max=u_max, columns=chosen, dp=table or None, sample_rate=sample_rate, skip_rows=skip_rows,
             missing=missing or None,
         )  # fmt: skip
-        if in_per_cent and not declared.u_max:
+        if in_per_cent:
             remarks.notes.append('full command: in per cent, so not recorded; u-max = "10 V" is a guess, correct it')
-        elif not in_per_cent:
-            usual, u_seen = _full_command(tests)
-            u_max = u_max if declared.u_max else usual
+        else:
+            u_max, u_seen = _full_command(tests)
         valve = _identified(tests, u_max, guessed_dp, remarks)
     seen, opens = tuple(_summary(looks, u_seen, valve, remarks.notes)), tuple(dict.fromkeys(remarks.opens))
     text = _rendered(
         seen=seen, opens=opens, u_max=u_max, u_seen=u_seen, in_per_cent=in_per_cent, skip_rows=skip_rows,
-        missing=missing, declared=declared, ends_at_full=ENDS_AT_FULL, sample_rate=sample_rate,
+        missing=missing, ends_at_full=ENDS_AT_FULL, sample_rate=sample_rate,
         meter=valve and valve.meter, negative_drop=_negative_drop(valve),
         first=paths[0].name, look=looks[0], columns=chosen,
         unclear=unclear, guessed_dp=guessed_dp, dp=table, readings=readings,
     )  # fmt: skip
     return Proposal(
         text=text, seen=seen, opens=opens, recordings=tuple(paths), labels=tuple(look.labels for look in looks),
-        columns=chosen, dp=table, u_max_V=u_max, u_seen_V=u_seen, valve=valve, unclear=unclear, look=looks[0],
-        unknown_dp=readings or ({paths[0].name: ()} if is_unknown else {}), guessed_dp=guessed_dp,
-        u_max_is_guess=not declared.u_max and (u_seen is None or u_seen < ENDS_AT_FULL * u_max),
+        columns=chosen, dp=table, u_max_V=u_max, u_seen_V=u_seen, valve=valve,
     )  # fmt: skip
 
 
@@ -184,17 +159,16 @@ def _columns_of_all(
 
 
 def _pressure_table(
-    names: Sequence[str], looks: "Sequence[ProposedColumns]", declared: Table, answers: Mapping[str, str],
-    has_column: bool, remarks: _Remarks,
+    names: Sequence[str], looks: "Sequence[ProposedColumns]", declared: Table, has_column: bool,
+    remarks: _Remarks,
 ) -> tuple[dict[str, str], dict[str, tuple[str, ...]]]:
-    """Return the pressure drops to declare, as said or by files' names; and as what other files' names can be read."""
+    """Return the pressure drops to declare, as declared or by names; and as what other files' names can be read."""
     from dzdesign.identify.reading.named_pressure import pressures_in_name
 
     if declared:
         return dict(declared) if isinstance(declared, Mapping) else dict.fromkeys(names, declared), {}
     recorded = [has_column or look.has_dp for look in looks]
     readings = {name: pressures_in_name(name) for name, has in zip(names, recorded, strict=True) if not has}
-    readings |= {name: (text,) for name, text in answers.items()}
     table = {name: texts[0] for name, texts in readings.items() if len(texts) == 1}
     readings = {name: texts for name, texts in readings.items() if len(texts) != 1}
     if readings and len(names) == 1 and not any(readings.values()):

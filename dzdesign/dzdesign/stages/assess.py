@@ -116,7 +116,7 @@ def assess_options(arguments: AssessArguments) -> "AssessOptions":
     from dzdesign.assess.options import AssessOptions
     from dzdesign.identify.options import IdentifyOptions
 
-    reading = IdentifyOptions(**meter_choices(arguments, ["u_max", "meter_floor", "meter_lag", "knee_window", "units"]))
+    reading = IdentifyOptions(**meter_choices(arguments, ["u_max", "meter_floor", "meter_lag", "knee_window"]))
     read = read_options(arguments, ["after_u_max", "reading_flow", "linearity_window"])
     after_u_max = read["after_u_max"]
     if after_u_max is not None and not after_u_max > 0:

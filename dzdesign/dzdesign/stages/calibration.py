@@ -9,7 +9,6 @@ from dzdesign.block_identity import of_another_valve
 from dzdesign.core.artefact_files import check_file_may_be_written, write_file
 from dzdesign.core.errors import InputError, nearest, quoted
 from dzdesign.core.options import AnyPath, Option, Text
-from dzdesign.stages.design import TARGETS
 from dzdesign.stages.given_compensator import given_compensator, refuse_underived
 
 if TYPE_CHECKING:
@@ -18,9 +17,6 @@ if TYPE_CHECKING:
     from dzdesign.codegen.calibration.reading import CalibrationReading
     from dzdesign.core.recorded_units import RecordedUnits
     from dzdesign.design.compensator import Compensator
-
-#: Where the names of the formats stand.
-FORMATS = "dzdesign.codegen.calibration.packing:FORMATS"
 
 
 @dataclass(frozen=True)
@@ -32,9 +28,9 @@ class CalibrationArguments:
     _: KW_ONLY
     output: Annotated[AnyPath | None, Option("FILE", short="-o")] = None
     """File to write. Its ending selects the format: .hex Intel HEX, .bin raw octets."""
-    format: Annotated[Text, Option("NAME", choices=FORMATS)] = None
+    format: Annotated[Text, Option("NAME")] = None
     """Format of a file with another ending: hex or bin (default: by the file's ending)."""
-    target: Annotated[Text, Option("NAME", choices=TARGETS)] = None
+    target: Annotated[Text, Option("NAME")] = None
     """Microcontroller whose addresses the file states (default: that of the design)."""
     address: Annotated[Text, Option("N", example="0x330000")] = None
     """Address of the block, in units of the target (default: 0x330000 for f28335, 0x98000 for f280049c, else 0). The
@@ -54,7 +50,7 @@ class ReadCalibrationArguments:
     compensator: Annotated["Compensator | AnyPath | None", Option("COMPENSATOR.json")] = None
     """The compensator.json to compare the block with, or a firmware folder that holds one."""
     _: KW_ONLY
-    format: Annotated[Text, Option("NAME", choices=FORMATS)] = None
+    format: Annotated[Text, Option("NAME")] = None
     """Format of a file with another ending: hex or bin (default: by the file's ending)."""
 
 

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from dzdesign.design.options import DesignOptions
     from dzdesign.identify.valve.model import ValveModel
 
-#: Where the names of the targets stand.
-TARGETS = "dzdesign.codegen.project:TARGET_NAMES"
 #: Options that only a command of both signs has a use for.
 OF_BOTH_SIGNS = ("negative_dp",)
 
@@ -30,7 +28,7 @@ class DesignArguments(DesignChoices):
     _: KW_ONLY
     output: Annotated[AnyPath | None, Option("FILE", command_default="compensator.json", short="-o")] = None
     """File to write."""
-    target: Annotated[str, Option("NAME", choices=TARGETS)] = "f28335"
+    target: Annotated[str, Option("NAME")] = "f28335"
     """Microcontroller whose converter and timer the law is designed for. `codegen --list-targets` lists them."""
 
 

@@ -10,7 +10,6 @@ from dzdesign.core.artefact_files import check_file_may_be_written, read_bytes, 
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.option_readers import percent, quantity
 from dzdesign.core.options import AnyPath, Option, Text
-from dzdesign.stages.generate import DEVICES
 from dzdesign.stages.given_compensator import given_compensator, refuse_underived
 
 if TYPE_CHECKING:
@@ -21,7 +20,6 @@ if TYPE_CHECKING:
     from dzdesign.verify.requirements import Check
 
 
-
 @dataclass(frozen=True)
 class ExportArguments:
     """Arguments of `export`."""
@@ -29,7 +27,7 @@ class ExportArguments:
     compensator: Annotated["Compensator | AnyPath", Option("COMPENSATOR.json")]
     """The compensator.json of the valve, or a folder that holds one. Its numbers are first derived again."""
     _: KW_ONLY
-    to: Annotated[Text, Option("DEVICE", choices=DEVICES)] = None
+    to: Annotated[Text, Option("DEVICE")] = None
     """Device: west (W.E.St. PAM-199), west-pam190, west-pos123, cia408 (CANopen), rmc (Delta RMC100), rmc75, beckhoff
     (TF5810) or csv."""
     output: Annotated[AnyPath | None, Option("FILE", short="-o")] = None

@@ -12,13 +12,6 @@ from dzdesign.core.options import OUTPUTS, AnyPath, Option, Text, flag_of, read_
 from dzdesign.design.design_choices import DEFAULTS, DesignChoices
 from dzdesign.stages.design import design_options
 
-#: Where the names of all targets stand, microcontrollers and others.
-ALL_TARGETS = "dzdesign.codegen.other_targets:ALL_TARGET_NAMES"
-#: Where the names of the amplifiers stand.
-DEVICES = "dzdesign.codegen.amplifier.device:DEVICE_NAMES"
-#: Forms of the core, the default first.
-FORMS = "dzdesign.design.firmware_manifest:FORMS"
-
 if TYPE_CHECKING:
     from dzdesign.codegen.other_targets import Output
     from dzdesign.codegen.project import Firmware
@@ -37,7 +30,7 @@ class OutputChoices:
     plant: Annotated[AnyPath | None, Option("PLANT.toml", OUTPUTS)] = None
     """File with a plant, for an FMU of the plant in addition, such as demo/example/plant.toml. It is for the
     output fmu only."""
-    device: Annotated[Text, Option("DEVICE", OUTPUTS, choices=DEVICES)] = None
+    device: Annotated[Text, Option("DEVICE", OUTPUTS)] = None
     """Device, for amplifier: west, west-pam190, west-pos123, cia408, rmc, rmc75, beckhoff or csv."""
     table_dp: Annotated[Text, Option("P", OUTPUTS, example="1 MPa", read=quantity("pressure"))] = None
     """Pressure drop of the characteristic, for amplifier with beckhoff or csv (default: dP0 of the valve)."""
@@ -54,10 +47,10 @@ class GenerateArguments(OutputChoices, DesignChoices):
     _: KW_ONLY
     output: Annotated[AnyPath | None, Option("DIR", short="-o")] = None
     """Folder to write (default of the command: firmware, or plc, fmu, matlab or amplifier for such an output)."""
-    target: Annotated[Text, Option("NAME", choices=ALL_TARGETS)] = None
+    target: Annotated[Text, Option("NAME")] = None
     """Microcontroller, or another output: iec61131, fmu, matlab, amplifier (default: the microcontroller of the design,
     and f28335 for a valve.json)."""
-    calibration: Annotated[Text, Option("FORM", choices=FORMS)] = None
+    calibration: Annotated[Text, Option("FORM")] = None
     """Form of the valve's numbers (default: fixed). fixed: constants in the core. block: a block of data that the core
     receives."""
     vectors: Annotated[int | str, Option("N", read=whole_number("a whole number up to 99999", digits=5))] = "0"

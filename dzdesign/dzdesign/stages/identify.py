@@ -9,13 +9,24 @@ from typing import TYPE_CHECKING, Annotated, Any
 from dzdesign.core.dither import read_dithered
 from dzdesign.core.errors import InputError, quoted
 from dzdesign.core.option_readers import number, percent, quantity
-from dzdesign.core.options import FIT, METER, RECORDINGS, AnyPath, Option, Paths, Table, Text, arguments_of, paths_of
+from dzdesign.core.options import (
+    FIT,
+    METER,
+    RECORDINGS,
+    AnyPath,
+    Option,
+    Paths,
+    Table,
+    Text,
+    Texts,
+    arguments_of,
+    paths_of,
+)
 from dzdesign.stages.recording_order import in_order, stated_order
 from dzdesign.stages.recording_parts import parts_of
 from dzdesign.stages.recordings import (
     RampArguments,
     check_places,
-    distinct_names,
     expand,
     meter_choices,
     read_recordings,
@@ -26,17 +37,13 @@ from dzdesign.terminal.progress import stage_progress
 
 if TYPE_CHECKING:
     from dzdesign.identify.options import IdentifyOptions
-    from dzdesign.identify.reading.low_flow_table import LowFlowTable
     from dzdesign.identify.reading.ramp_test import RampTest
+    from dzdesign.identify.valve.low_flow import LowFlow
     from dzdesign.identify.valve.model import ValveModel
     from dzdesign.identify.valve.stated_options import StatedOptions
 
 #: Arguments that are not an option of the identification itself: what is read and written, and what nothing is made of.
 NOT_STATED = ("ramps", "output", "plots", "record")
-#: Options that name files: stated by the names that these have in made_from.
-FILES = ("order", "low_flow")
-#: Of the threshold between the tests.
-PREMISES = "dzdesign.identify.constants:PREMISES"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +72,7 @@ class IdentifyChoices(RampArguments):
     repeatability: Annotated[Text, Option("S", FIT, example="0.1 %", read=percent("0.1 %"))] = None
     """Standard deviation of the threshold from ramp to ramp, in percent of full command, such as "0.1 %" (default:
     measured on repeated ramps, otherwise 0.25 %)."""
-    curve: Annotated[Text, Option("PREMISE", FIT, choices=PREMISES)] = None
+    curve: Annotated[Text, Option("PREMISE", FIT)] = None
     """Premise about the threshold between the tests. line: a straight line against the pressure drop. smooth:
     curvature at most M. monotone: it runs one way. The default is smooth where a curvature is declared or three or more
     pressure drops support it, and monotone otherwise."""
@@ -99,9 +106,9 @@ class IdentifyArguments(IdentifyChoices):
     _: KW_ONLY
     output: Annotated[AnyPath | None, Option("FILE", command_default="valve.json", short="-o")] = None
     """File to write."""
-    low_flow: Annotated[Paths, Option("TABLE.csv", METER)] = ()
-    """Table of flows below the meter's floor, measured by hand with a measuring glass or by a cylinder's drift. Columns
-    are u_V, dP_MPa, Q [mL/min], Q_error [mL/min] and branch (opening or closing). Repeatable."""
+    low_flow: Annotated[Texts, Option("READING", METER)] = ()
+    """Flow below the meter's floor, measured by hand with a measuring glass or by a cylinder's drift, such as
+    "5 +- 1 mL/min at 5.16 V, 5 MPa, closing". The last word is opening or closing. Repeatable."""
     plots: Annotated[AnyPath | None, Option("DIR")] = None
     """Folder for plots in SVG and PNG. They show the flow at each pressure drop with knees, onsets and residuals, and
     thresholds, bounds and beta against dP."""
@@ -149,21 +156,20 @@ def identify(arguments: IdentifyArguments) -> "ValveModel":
     """
     from dzdesign.identify.identification import identify_sides
     from dzdesign.identify.plots.valve_plots import plot_files
+    from dzdesign.identify.reading.low_flow_readings import read_low_flow
     from dzdesign.identify.valve.model import ValveModel
 
     options, record = identify_options(arguments), record_of(arguments.record)
     check_places(ValveModel, arguments.output, arguments.plots)
     paths = expand(arguments.ramps)
     tests = _read(arguments, options, paths)
-    tables = _read_low_flow([Path(path) for path in paths_of(arguments.low_flow)], options.u_max)
-    refuse_copies([*tests, *tables])
-    if alike := {test.source for test in tests} & {table.source for table in tables}:
-        raise InputError(f"--low-flow: a recording is called '{alike.pop()}' too; rename one of them")
+    by_hand = read_low_flow(arguments.low_flow, options.u_max)
+    refuse_copies(tests)
     asked = None if arguments.order is None else paths_of(arguments.order)
     tests, order = in_order(tests, paths, asked), stated_order(tests, paths, asked)
     with stage_progress(f"fitting {len(tests)} recording{'s' if len(tests) > 1 else ''}"):
-        found = identify_sides(tests, options, record, tables)
-    stated = stated_options(arguments, order=order, low_flow=[table.source for table in tables])
+        found = identify_sides(tests, options, record, by_hand)
+    stated = stated_options(arguments, order)
     found = replace(found, model=replace(found.model, options=stated))
     write_results(found.model, arguments.output, arguments.plots, lambda: plot_files(found))
     return found.model
@@ -177,16 +183,7 @@ def _read(
         paths, u_max=options.u_max, columns=arguments.columns, dp=arguments.dp,
         sample_rate=arguments.sample_rate, skip_rows=arguments.skip_rows, missing=arguments.missing, names=names,
     )  # fmt: skip
-    return parts_of(tests, arguments.from_, arguments.to, options.u_max)
-
-
-def _read_low_flow(
-    paths: list[Path], u_max: float, names: Sequence[str] = ()
-) -> "list[LowFlowTable]":
-    """Read the tables of flows that were measured by hand."""
-    from dzdesign.identify.reading.low_flow_table import read_low_flow
-
-    return [read_low_flow(path, u_max, name) for path, name in zip(paths, names or distinct_names(paths), strict=True)]
+    return parts_of(tests, arguments.from_, arguments.to)
 
 
 def identify_again(options: "StatedOptions", record: Mapping[str, str], files: Mapping[str, Path]) -> "ValveModel":
@@ -200,7 +197,7 @@ def identify_again(options: "StatedOptions", record: Mapping[str, str], files: M
     from dzdesign.identify.identification import identify_sides
 
     again = read_again(options, files)
-    return replace(identify_sides(again.tests, again.options, record, again.tables).model, options=options)
+    return replace(identify_sides(again.tests, again.options, record, again.by_hand).model, options=options)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -209,7 +206,7 @@ class ReadAgain:
 
     options: "IdentifyOptions"
     tests: "list[RampTest]"
-    tables: "list[LowFlowTable]"
+    by_hand: "list[LowFlow]"
 
 
 def read_again(options: "StatedOptions", files: Mapping[str, Path]) -> ReadAgain:
@@ -220,43 +217,40 @@ def read_again(options: "StatedOptions", files: Mapping[str, Path]) -> ReadAgain
     InputError
         If an option or a file can't be read.
     """
+    from dzdesign.identify.reading.low_flow_readings import read_low_flow
     from dzdesign.identify.reading.series_order import in_stated_order
 
-    known = {argument.name for argument in arguments_of(IdentifyArguments)} - {*NOT_STATED, *FILES}
+    known = {argument.name for argument in arguments_of(IdentifyArguments)} - {*NOT_STATED, "order"}
     given: dict[str, Any] = {**options.texts, **options.tables, **options.lists}
-    order, by_hand = (given.pop(name, ()) for name in FILES)
+    order = given.pop("order", ())
     if strange := [name for name in given if name not in known]:
         raise InputError(f"its options name {quoted(strange[0])}, which is no option of `identify`")
     arguments = IdentifyArguments([], **given)
     choices = identify_options(arguments)
-    if strange := [name for name in by_hand if name not in files]:
-        raise InputError(f"its option low_flow names {quoted(strange[0])}, which is none of the files in made_from")
-    tables = _read_low_flow([files[name] for name in by_hand], choices.u_max, by_hand)
-    ramps = {name: path for name, path in files.items() if name not in by_hand}
-    tests = _read(arguments, choices, list(ramps.values()), list(ramps))
+    tests = _read(arguments, choices, list(files.values()), list(files))
     if order:
         by_name = {test.source: test for test in tests}
         if sorted(order) != sorted(by_name):
             raise InputError("its option order does not name each recording once")
         stated = {test.source: test for test in in_stated_order([by_name[name] for name in order])}
         tests = [stated[test.source] for test in tests]
-    return ReadAgain(options=choices, tests=tests, tables=tables)
+    return ReadAgain(options=choices, tests=tests, by_hand=read_low_flow(arguments.low_flow, choices.u_max))
 
 
-def stated_options(
-    arguments: IdentifyArguments, order: Sequence[str] = (), low_flow: Sequence[str] = ()
-) -> "StatedOptions":
+def stated_options(arguments: IdentifyArguments, order: Sequence[str] = ()) -> "StatedOptions":
     """Return the options as valve.json has them: all but places and the record, those that were not given too."""
     from dzdesign.identify.valve.stated_options import StatedOptions
 
     texts: dict[str, str] = {}
     tables: dict[str, Mapping[str, str]] = {}
-    lists = {name: tuple(files) for name, files in zip(FILES, (order, low_flow), strict=True) if files}
+    lists = {"order": tuple(order)} if order else {}
     for argument in arguments_of(IdentifyArguments):
-        value = None if argument.name in (*NOT_STATED, *FILES) else getattr(arguments, argument.name)
+        value = None if argument.name in (*NOT_STATED, "order") else getattr(arguments, argument.name)
         if isinstance(value, Mapping):
             tables[argument.name] = {str(key): str(text) for key, text in value.items()}
         elif isinstance(value, list | tuple):
+            if not value:
+                continue
             lists[argument.name] = tuple(map(str, value))
         elif value is not None:
             texts[argument.name] = str(value)

@@ -11,7 +11,7 @@ from dzdesign.core.options import AnyPath, Option, Paths, read_options
 from dzdesign.stages.recordings import ColumnArguments, read_missing
 
 if TYPE_CHECKING:
-    from dzdesign.initial_options.proposal import Declared, Proposal
+    from dzdesign.initial_options.proposal import Proposal
 
 
 @dataclass(frozen=True)
@@ -46,15 +46,8 @@ def init(arguments: InitArguments) -> "Proposal":
     >>> proposal.columns
     {}
     """
-    check_output(arguments)
-    proposal = look(arguments)
-    if arguments.output is not None:
-        write_file(Path(arguments.output), proposal.text)
-    return proposal
+    from dzdesign.initial_options.proposal import propose
 
-
-def check_output(arguments: InitArguments) -> None:
-    """Refuse a file that is there, or that can't be written."""
     output = arguments.output
     if output is not None:
         if os.path.lexists(output):
@@ -62,18 +55,14 @@ def check_output(arguments: InitArguments) -> None:
                 f"'{output}' exists, and init never writes over a file; give another name with -o, or move it away"
             )
         check_file_may_be_written(Path(output))
-
-
-def look(arguments: InitArguments, declared: "Declared | None" = None) -> "Proposal":
-    """Look at recordings, and propose the options file with what a person declared; nothing is written."""
-    from dzdesign.initial_options.proposal import propose
-
-    return propose(
+    proposal = propose(
         arguments.ramps,
         columns=arguments.columns,
         dp=arguments.dp,
         sample_rate=arguments.sample_rate,
         skip_rows=read_options(arguments, ["skip_rows"])["skip_rows"],
         missing=read_missing(arguments.missing),
-        declared=declared,
     )
+    if output is not None:
+        write_file(Path(output), proposal.text)
+    return proposal

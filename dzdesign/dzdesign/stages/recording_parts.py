@@ -12,19 +12,18 @@ if TYPE_CHECKING:
     from dzdesign.identify.reading.ramp_test import RampTest
 
 
-#: Ramps that a message lists.
-NAMED_RAMPS = 6
+#: The command is at rest within this share of its range.
+AT_REST = 0.1
 
 
-def parts_of(tests: "Sequence[RampTest]", start: Table, end: Table, u_max: float) -> "list[RampTest]":
+def parts_of(tests: "Sequence[RampTest]", start: Table, end: Table) -> "list[RampTest]":
     """Return recordings without what lies before `start` and after `end`, which their records say.
-
-    What is left of a branch that this cuts, and shows no threshold any more, is left out too. `u_max` is in V.
 
     Raises
     ------
     InputError
-        If a table names no recording, or too few rows are left of one.
+        If a table names no recording, too few rows are left of one, or a ramp is cut: a knee would be laid through
+        what is left of it.
     """
     for option, table in (("from", start), ("to", end)):
         for pattern in table if isinstance(table, Mapping) else ():
@@ -34,9 +33,7 @@ def parts_of(tests: "Sequence[RampTest]", start: Table, end: Table, u_max: float
                     f"[{option}] names '{pattern}', which is no recording here{nearest(pattern, known)}; correct the "
                     "name, or leave it out"
                 )
-    return [
-        _part(test, _seconds(test.source, start, "from"), _seconds(test.source, end, "to"), u_max) for test in tests
-    ]
+    return [_part(test, _seconds(test.source, start, "from"), _seconds(test.source, end, "to")) for test in tests]
 
 
 def _names(pattern: str, source: str) -> bool:
@@ -56,12 +53,11 @@ def _seconds(source: str, table: Table, option: str) -> float | None:
     return parse_quantity(table[patterns[0]], "time", f"[{option}] '{patterns[0]}'") if patterns else None
 
 
-def _part(test: "RampTest", start: float | None, end: float | None, u_max: float) -> "RampTest":
+def _part(test: "RampTest", start: float | None, end: float | None) -> "RampTest":
     import dataclasses
 
     import numpy as np
 
-    from dzdesign.identify.ramps.cut_ramps import parts_of_ramps
     from dzdesign.identify.ramps.sweep_pressure import stretches
     from dzdesign.identify.reading.ramp_files import MIN_ROWS
 
@@ -78,15 +74,13 @@ def _part(test: "RampTest", start: float | None, end: float | None, u_max: float
             f"'{test.source}' runs from {test.time[0]:.1f} to {test.time[-1]:.1f} s: {asked} leaves "
             f"{np.count_nonzero(kept)} rows, expected at least {MIN_ROWS} of a ramp test; correct the seconds"
         )
-    ramps = parts_of_ramps(test, kept, u_max)
-    if ramps and not any(ramp.kept for ramp in ramps):
-        names = "; ".join([ramp.name for ramp in ramps[:NAMED_RAMPS]] + ["..."] * (len(ramps) > NAMED_RAMPS))
-        raise InputError(
-            f"'{test.source}': {asked} leaves no whole branch of a ramp, expected at least one; the recording has "
-            f"{names}: choose seconds at rest, before and after a ramp"
-        )
-    cut = tuple(f"{ramp.name} ({' and '.join(ramp.lost)})" for ramp in ramps if ramp.is_cut and ramp.lost)
-    for ramp in ramps:
-        kept &= ~ramp.fragment
-    left_out = tuple(stretches(test, np.flatnonzero(~kept), "option"))
-    return dataclasses.replace(test.part(kept), left_out=left_out, cut=cut)
+    size, last = np.abs(test.u), test.time.size - 1
+    rest = float(size.min()) + AT_REST * float(np.ptp(size))
+    for row in (0, -1):
+        place = int(np.flatnonzero(kept)[row])
+        if place not in (0, last) and size[place] > rest:
+            raise InputError(
+                f"'{test.source}': {asked} cuts a ramp at {test.time[place]:.1f} s, where the command is not at rest; "
+                "choose seconds before and after a whole ramp"
+            )
+    return dataclasses.replace(test.part(kept), left_out=tuple(stretches(test, np.flatnonzero(~kept), "option")))

@@ -15,7 +15,6 @@ from dzdesign.core.artefact_files import (
     write_file,
     write_files,
 )
-from dzdesign.core.chosen_units import read_units
 from dzdesign.core.errors import InputError, nearest, neighbour, quoted
 from dzdesign.core.option_readers import percent_range, quantity, whole_number, with_tolerance
 from dzdesign.core.options import (
@@ -36,7 +35,6 @@ from dzdesign.terminal.progress import say, stage_progress, with_bar
 
 if TYPE_CHECKING:
     from dzdesign.core.artefact_types import Artefact
-    from dzdesign.identify.reading.low_flow_table import LowFlowTable
     from dzdesign.identify.reading.ramp_test import RampTest
 
 
@@ -97,10 +95,6 @@ class RampArguments(ColumnArguments):
     meter_lag: Annotated[Text, Option("T", METER, example="0.1 s", read=with_tolerance("time"))] = None
     """Lag of the flow meter, with its tolerance, such as "0.1 s +- 0.02 s" (default: found from ramps of two rates).
     Without a tolerance it is 20 %, and at least 0.05 s."""
-    units: Annotated[Texts | None, Option("U", RECORDINGS, read=read_units)] = None
-    """Units of printed and drawn results, such as "bar, %, mA" (default: those of the recordings). They are of
-    pressure, flow, command ("%" of full command, or a voltage) and current. Files stay in V, MPa and L/min. Repeatable;
-    in the options file also a list."""
     knee_window: Annotated[str, Option("A-B", FIT, read=percent_range("the largest flow such as '12-50'"))] = "12-50"
     """Flow range of the straight-line fit, in percent of maximum flow."""
 
@@ -258,29 +252,26 @@ def _refuse_unnamed(tests: list["RampTest"], declared: Table) -> None:
             )
 
 
-def refuse_copies(recordings: Sequence["RampTest | LowFlowTable"]) -> None:
+def refuse_copies(tests: Sequence["RampTest"]) -> None:
     """Refuse a recording that is given twice: counting a copy as a repeat would understate the uncertainty.
 
     The same file, or the same samples: see `copies`.
     """
     from dzdesign.identify.reading.copies import find_copy
-    from dzdesign.identify.reading.ramp_test import RampTest
 
     known: dict[str, str] = {}
-    for recording in recordings:
+    for recording in tests:
         if recording.sha256 in known:
             raise InputError(
                 f"'{recording.source}' is an exact copy of the recording '{known[recording.sha256]}'; give it once "
                 "(a repeated ramp test is welcome, a copy is no repetition)"
             )
         known[recording.sha256] = recording.source
-    tests = [recording for recording in recordings if isinstance(recording, RampTest)]
     if copy := find_copy(tests):
         raise InputError(
-            f"'{tests[copy.other].source}' is the recording '{tests[copy.one].source}', saved again: from "
-            f"{copy.from_s:.1f} to {copy.to_s:.1f} s, {copy.agree} of {copy.compared} samples with flow have the same "
-            "command, flow and pressure drop. Give it once. A repeated ramp test is welcome, but a copy is no "
-            "repetition, nor is a second run of a simulation without noise"
+            f"'{tests[copy.other].source}' is the recording '{tests[copy.one].source}', saved again: {copy.agree} of "
+            f"{copy.compared} rows with flow are in both. Give it once. A repeated ramp test is welcome, but a copy is "
+            "no repetition, nor is a second run of a simulation without noise"
         )
 
 

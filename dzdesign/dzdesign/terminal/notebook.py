@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 from dzdesign.core.errors import one_line
 from dzdesign.terminal.page import FILE_WIDTH, put_line
-from dzdesign.terminal.plan_tables import print_plan
 from dzdesign.terminal.tables import print_compensator, print_firmware, print_output, print_valve
 from dzdesign.terminal.verification_tables import print_output_verification, print_verification
 
@@ -60,10 +59,6 @@ PAGES: Mapping[str, tuple[Callable[[Any], str], Callable[[Any, "Console"], None]
     "Output": (
         lambda made: f"Output for {made.manifest.target}, law {made.manifest.law}, {len(made.files)} files",
         _print_output,
-    ),
-    "SeriesPlan": (
-        lambda plan: f"Test series of {plan.chosen.ramps} ramps, {plan.chosen.duration_min:g} min",
-        print_plan,
     ),
     "Verification": (lambda verification: f"Verification: {verification.verdict}", print_verification),
     "OutputVerification": (lambda verification: f"Verification: {verification.verdict}", print_output_verification),

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 #: Files of a test that its row names, and characters by which their names may differ.
 NAMED_FILES, LONGEST_DIFFERENCE = 6, 12
+#: Pressure drops over which a distance is averaged.
+GRID = 101
 
 
 def _rational(value: "Fraction") -> str:
@@ -140,7 +142,6 @@ def short_source(source: str, ramps: "Sequence[str]") -> str:
 def _side_lines(side: "SideModel", units: "RecordedUnits") -> tuple[str, ...]:
     dp0 = side.reference.dp_MPa
     at, reference = ("", "") if dp0 is None else (" at dP0", f" at the reference pressure drop {_dp0(dp0, units)}")
-    limits = "the bounds" if len(side.tests) < 2 else "the bounds and by the premise between tests"
     certificate = side.certificate
     return (
         f"bound: lower bound of the {certificate.guard} threshold; all bounds hold together with "
@@ -149,8 +150,8 @@ def _side_lines(side: "SideModel", units: "RecordedUnits") -> tuple[str, ...]:
         f"scatter between ramps: {certificate.repeatability.in_words(units)}",
         f"identified: {certificate.guard} knee u_min0 = {units.number(side.reference.u_min_V, '.4f V')} ± "
         f"{units.text(side.reference.u_min_se_V, '.4f dV')}{reference}{_betas(side, units)}",
-        f"certified: largest output at zero command (offset) {units.text(side.curve.u_min0_V, '.4f V')}{at}. It is "
-        f"limited by {limits}; more tests can raise it",
+        f"certified: largest output at zero command (offset) {units.text(side.curve.u_min0_V, '.4f V')}{at}. "
+        f"{gains_most(side, units)}",
         side.premise_in_words(units),
         *_premise_lines(side),
         f"drive range of the valve (knee to full stroke): k x_max/u_max = {side.k_x_max_over_u_max:.4f} ± "
@@ -165,6 +166,36 @@ def _side_lines(side: "SideModel", units: "RecordedUnits") -> tuple[str, ...]:
         else f"trend with dP: {side.trend} ({units.number(1e3 * side.trend_change_V, '+.1f mV')} ± "
         f"{units.text(1e3 * side.trend_change_se_V, '.1f mV')} over the tested range, {chance(side.trend_p or 0.0)})",
     )
+
+
+def gains_most(side: "SideModel", units: "RecordedUnits") -> str:
+    """Say how far the offset lies below the threshold, at the tests and between them, and what would raise it most."""
+    import numpy as np
+
+    curve = side.curve
+    dp = np.linspace(*side.valid_dp_MPa, GRID) if side.valid_dp_MPa else np.array([0.0])
+    threshold, bound, offset = (
+        np.interp(dp, nodes or (0.0,), values)
+        for nodes, values in (
+            (curve.dp_MPa, curve.u_threshold_V), (curve.dp_MPa, curve.u_lower_V), (curve.offset_dp_MPa, curve.offset_V)
+        )
+    )  # fmt: skip
+    at_tests, between = 1e3 * float(np.mean(threshold - bound)), 1e3 * float(np.mean(bound - offset))
+    scatter, noise = side.certificate.repeatability, float(np.mean([test.u_knee_se_V for test in side.tests]))
+    if between > at_tests:
+        most = "More pressure drops"
+    elif 2e3 * float(np.mean(curve.errors.budget_V)) > at_tests:
+        most = "Slower ramps, or lag and zero of the meter known better,"
+    elif scatter.origin == "assumed":
+        most = "Repeated ramps, as their scatter is assumed,"
+    elif scatter.sd_V > noise:
+        most = "More ramps at each pressure drop"
+    else:
+        most = "Slower ramps or a quieter meter"
+    apart = f"On average it lies {units.text(at_tests, '.1f mV')} below the threshold at the tests"
+    if len(side.tests) > 1:
+        apart += f", and {units.text(between, '.1f mV')} more between them"
+    return f"{apart}. {most} would gain most"
 
 
 def _dp0(dp0_MPa: float, units: "RecordedUnits") -> str:

@@ -20,11 +20,12 @@ from dzdesign.identify.data_quality.whole_meter import about_whole_meter
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.dithered_command import without_dither
 from dzdesign.identify.ramps.sides import tests_of_side
-from dzdesign.identify.reading.low_flow_table import LowFlowTable, readings_of_side
+from dzdesign.identify.reading.low_flow_readings import readings_of_side
 from dzdesign.identify.reading.ramp_test import RampTest
-from dzdesign.identify.reading.units_of_columns import shown_units, units_of
+from dzdesign.identify.reading.units_of_columns import units_of
 from dzdesign.identify.results import Identification, SideIdentification
 from dzdesign.identify.side import identify_side
+from dzdesign.identify.valve.low_flow import LowFlow
 from dzdesign.identify.valve.model import DECIMALS, SIDES, Meter, ValveModel, Warning_
 
 #: What ramps of several pressure drops show where a stuck sensor has made one test of them: no word on meter or valve.
@@ -64,7 +65,7 @@ def identify_sides(
     tests: Sequence[RampTest],
     options: IdentifyOptions | None = None,
     record: Mapping[str, str] | None = None,
-    low_flow: Sequence[LowFlowTable] = (),
+    low_flow: Sequence[LowFlow] = (),
 ) -> Identification:
     """Identify a valve as `identify` does, and return beside it what each side was found from.
 
@@ -73,16 +74,15 @@ def identify_sides(
     options = options or IdentifyOptions()
     if not tests:
         raise InputError("no ramp tests were given; expected at least one file")
-    units = shown_units(tests, options)
-    dither = options.dithered.of(units_of(tests), options.u_max) if options.dithered else None
+    units = units_of(tests)
+    dither = options.dithered.of(units, options.u_max) if options.dithered else None
     tests = [without_dither(test, dither, options.u_max) for test in tests]
     sides, warnings = _each_side(tests, options, units, low_flow)
     lag = next(iter(sides.values())).described.lag
     zeros = {name: side.described.zero_L_min for name, side in sides.items()}
-    # In whatever order they came: those of the pressure drops, then those of a side that was refused, then tables.
+    # In whatever order they came: those of the pressure drops, then those of a side that was refused.
     files = dict.fromkeys(file for side in sides.values() for item in side.described.tests for file in item.files)
     files |= dict.fromkeys(sorted((test.source, test.sha256) for test in tests))
-    files |= dict.fromkeys(sorted((table.source, table.sha256) for table in low_flow))
     model = ValveModel(
         tool=THIS_TOOL,
         made_from=tuple(SourceFile(source=source, sha256=digest) for source, digest in files),
@@ -117,7 +117,7 @@ def identify_sides(
 
 
 def _each_side(
-    tests: Sequence[RampTest], options: IdentifyOptions, units: RecordedUnits, low_flow: Sequence[LowFlowTable]
+    tests: Sequence[RampTest], options: IdentifyOptions, units: RecordedUnits, low_flow: Sequence[LowFlow]
 ) -> tuple[dict[str, SideIdentification], list[Warning_]]:
     """Identify each side that was recorded; warnings and a refusal are in the units of the recordings."""
     sides: dict[str, SideIdentification] = {}

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 
-from dzdesign.core.chosen_units import ChosenUnits
 from dzdesign.core.dither import DeclaredDither
 from dzdesign.core.errors import InputError, quoted
 from dzdesign.identify.constants import MPA, PREMISES, Premise
@@ -57,8 +56,6 @@ class IdentifyOptions:
     dithered : DeclaredDither or None
         Dither that the drive superimposed on the command of every recording. None: no dither, and `design` assumes none
         in the recordings.
-    units : ChosenUnits or None
-        Units in which results are displayed; None selects those of the recordings.
     """
 
     u_max: float = 10.0
@@ -77,7 +74,6 @@ class IdentifyOptions:
     curve: Premise | None = None
     curvature: float | None = None
     dithered: DeclaredDither | None = None
-    units: ChosenUnits | None = None
 
     def __post_init__(self) -> None:
         if not self.u_max > 0:

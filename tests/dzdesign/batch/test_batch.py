@@ -26,7 +26,7 @@ from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
-from dzdesign.core.folder_swap import UNPLACED
+from dzdesign.core.placing import ABANDONED_S, UNPLACED
 from dzdesign.design.ceiling import DECIMALS
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.design_choices import DesignChoices
@@ -128,7 +128,7 @@ def test_order_and_parts_in_the_options_file_count_for_every_valve(lot, tmp_path
     assert Path("valve.json").read_bytes() == Path("out/valves/V0001/valve.json").read_bytes()
     options = json.loads(Path("valve.json").read_text())["options"]
     assert options["lists"]["order"] == [*names[1:], names[0]] and options["tables"]["from_"] == {"*.csv": "0.05 s"}
-    Path("dz.toml").write_text('low-flow = "glass.csv"\n')
+    Path("dz.toml").write_text('low-flow = "5 +- 1 mL/min at 5.16 V, 5 MPa, closing"\n')
     assert main(["batch", "lot", "-o", "other", "--config", "dz.toml"]) == 2
     assert "'dz.toml': low-flow is of one valve, and batch has no such option" in capsys.readouterr().err
 
@@ -168,9 +168,8 @@ def test_only_what_changed_is_done_again(lot, copy, tmp_path, capsys):
     assert "was changed since dzdesign wrote it" in reasons["V0004"]
 
 
-def test_two_batches_do_not_share_a_folder(lot, copy, monkeypatch, capsys):
+def test_two_batches_do_not_share_a_folder(lot, copy, capsys):
     fcntl = pytest.importorskip("fcntl", reason="this system has no such locks")
-    monkeypatch.setattr("dzdesign.core.folder_swap.LOCK_PATIENCE_S", 0.1)
     before = tree(copy)
     other = os.open(copy, os.O_RDONLY)
     try:
@@ -217,6 +216,9 @@ def test_a_killed_run_leaves_whole_folders_and_is_taken_up_by_more_jobs(lot, mad
     kept = output / "valves" / ".V0001.original"  # somebody's own
     for each in (torn, kept):
         each.mkdir()
+    long_ago = time.time() - 2 * ABANDONED_S
+    for each in output.rglob(f"{UNPLACED}*"):
+        os.utime(each, (long_ago, long_ago))
     assert main([*command, "2"]) == 1
     kept.rmdir()
     assert tree(output) == tree(made) and not torn.exists()

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from dzdesign.command_line.cli import main
-from dzdesign.core import folder_swap as exchange
 from tests.support.synthetic import needs_compiler
 
 HEADER = "time_s,u_V,dP_MPa,Q_Lmin"
@@ -546,7 +545,7 @@ def test_a_full_disk_leaves_the_old_output(refusal, monkeypatch):
         with monkeypatch.context() as patched:
             patched.setattr(os, name, full)
             assert "No space left on device" in refusal("identify", "a.csv", "-o", "valve.json")
-    monkeypatch.setattr(exchange, "exchanged", full)
+    monkeypatch.setattr(os, "replace", full)
     assert "No space left on device" in refusal("codegen", "compensator.json", "-o", "firmware")
 
 

@@ -36,7 +36,7 @@ def sentence(done: subprocess.CompletedProcess[str]) -> str:
     return lines[-1]
 
 
-@pytest.mark.parametrize("words", ["dz --help", "dz codegen --help", "dz doctor", "dz schema valve"])
+@pytest.mark.parametrize("words", ["dz --help", "dz codegen --help", "dz doctor"])
 def test_an_output_that_is_full(tmp_path, words):
     assert "can't be printed: No space left" in sentence(run(f"{words} > /dev/full", tmp_path))
 
@@ -77,18 +77,6 @@ def test_an_interrupt_names_what_was_written_before(tmp_path, monkeypatch, capsy
         said
         == f"dzdesign: interrupted; nothing half-written was left; written before that: '{tmp_path / 'valve.json'}'\n"
     )
-
-
-def test_too_little_memory_for_recordings(tmp_path):
-    done = run(f"ulimit -v 1000000; '{DZDESIGN}' identify {RAMPS}/ramp_dP1_1.csv.gz -o valve.json", tmp_path)
-    assert "address space" in sentence(done) and not list(tmp_path.iterdir())
-
-
-def test_too_little_memory_for_any_command(tmp_path):
-    """A library of linear algebra would end the process by itself, with status 1."""
-    for limit in (400_000, 100_000):
-        done = run(f"ulimit -v {limit}; '{DZDESIGN}' schema valve", tmp_path)
-        assert "address space" in sentence(done) and not done.stdout
 
 
 @pytest.mark.parametrize(("blocks", "said"), [(0, "no folder for temporary files"), (8, "a temporary file can't be")])

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from corpus import cases, write
 
-import dzdesign.identify.ramps.cut_ramps
 from dzdesign import api
 from dzdesign.command_line.cli import main
 from tests.support import bench_recordings as bench
@@ -70,8 +69,8 @@ def test_python_writes_it_with_an_underscore(recording):
         ([], 'from = "60"', ["'options.toml': from is '60' without a unit", 'from = "60 s"']),
         ([], '[to]\n"rest.csv" = "60 s"', ["[to] names 'rest.csv'"]),
         (["--from", "60 s", "--to", "50 s"], "", ["--from 60 s and --to 50 s", "0 rows"]),
-        (["--from", "110 s"], "", ["--from 110 s leaves no whole branch", "ramp 1, ", "; ramp 2, ", "at rest"]),
-        (["--to", "8 s"], "", ["--to 8 s leaves no whole branch", "ramp 1, ", "; ramp 2, ", "at rest"]),
+        (["--from", "110 s"], "", ["--from 110 s cuts a ramp at 110.0 s", "not at rest"]),
+        (["--to", "8 s"], "", ["--to 8 s cuts a ramp at 8.0 s", "not at rest"]),
         (["--from", "40 MPa"], "", ["--from"]),
     ],
 )
@@ -97,78 +96,21 @@ def test_messages_in_python_name_its_keyword(recording, from_, says):
     assert says in str(caught.value) and "[from]" not in str(caught.value) and "--" not in str(caught.value)
 
 
-def cut_ramps(capsys) -> list[str]:
-    capsys.readouterr()
-    warnings = json.loads(Path("valve.json").read_text())["warnings"]
-    return [each["text"] for each in warnings if each["code"] == "cut-ramp"]
+@pytest.mark.parametrize("cut", [{"from_": "20 s"}, {"to": "30 s"}, {"from_": "1 s", "to": "100 s"}])
+def test_a_cut_within_a_ramp_is_refused(recording, cut, wording, request):
+    """A knee would be laid through what is left of it."""
+    with wording.refusal(api.InputError, f"parts of recordings: {' '.join(cut)}"):
+        api.identify(recording, **cut)
 
 
-class TestCutRamps:
-    @staticmethod
-    def three(tmp_path: Path, dp_MPa: float = 1.0, source: str = "three.csv") -> str:
-        """Write three ramps, 30 s up and 30 s down, each with rests of 3 s before and after it."""
-        taken = [bench.record(bench.Valve(), dp_MPa, seed=seed, rate_Hz=20.0, hold_s=10.0) for seed in range(3)]
-        length = 0.3 * taken[0].time[-1]
-        time = np.concatenate([0.3 * test.time + place * (length + 0.015) for place, test in enumerate(taken)])
-        u, q, dp = (np.concatenate([getattr(test, name) for test in taken]) for name in ("u", "q", "dp"))
-        return bench.write(tmp_path / source, replace(taken[0], time=time, u=u, q=q, dp=dp))
-
-    @pytest.fixture
-    def name(self, tmp_path, monkeypatch):
-        monkeypatch.chdir(tmp_path)
-        return Path(self.three(tmp_path)).name
-
-    @pytest.mark.parametrize(
-        ("options", "ramps", "lost"),
-        [
-            (["--from", "20 s"], 3, "ramp 1, 3.3 to 63.3 s (rising)"),
-            (["--from", "50 s"], 2, "ramp 1, 3.3 to 63.3 s (rising and falling)"),
-            (["--to", "150 s"], 2, "ramp 3, 136.5 to 196.5 s (rising and falling)"),
-            (["--to", "180 s"], 3, "ramp 3, 136.5 to 196.5 s (falling)"),
-            (["--from", "1 s", "--to", "66 s"], 1, ""),
-            (["--from", "3.6 s"], 3, ""),
-            (["--from", "6 s", "--to", "134 s"], 2, ""),
-        ],
-    )
-    def test_the_whole_ones_count_and_the_cut_one_is_named(self, name, options, ramps, lost, capsys):
-        known = ["--meter-lag", "0 s +- 0.01 s", "--repeatability", "0.1 %"]
-        assert main(["-q", "identify", name, *options, *known]) == 0
-        texts = cut_ramps(capsys)
-        assert [lost in text for text in texts] == ([True] if lost else [])
-        (test,) = json.loads(Path("valve.json").read_text())["sides"]["positive"]["tests"]
-        assert len(test["ramps"]) == ramps
-        assert test["u_knee_rising_V"] == pytest.approx(bench.Valve().opening, abs=0.003)
-        assert test["u_knee_falling_V"] == pytest.approx(bench.Valve().closing, abs=0.003)
-
-    def test_one_side_of_two(self, tmp_path, monkeypatch, capsys):
-        monkeypatch.chdir(tmp_path)
-        taken = [bench.record(bench.Valve(), seed=1, rate_Hz=20.0, sign=sign) for sign in (1, -1, 1, -1)]
-        time = np.concatenate([test.time + 210.0 * place for place, test in enumerate(taken)])
-        u, q, dp = (np.concatenate([getattr(test, name) for test in taken]) for name in ("u", "q", "dp"))
-        bench.write(tmp_path / "both.csv", replace(taken[0], time=time, u=u, q=q, dp=dp))
-        assert main(["-q", "identify", "both.csv", "--from", "250 s", "--meter-lag", "0 s"]) == 0
-        (text,) = cut_ramps(capsys)
-        assert "ramp 1 (negative side), 215.0 to 414.9 s (rising)" in text
-        sides = json.loads(Path("valve.json").read_text())["sides"]
-        assert [len(sides[name]["tests"][0]["ramps"]) for name in ("positive", "negative")] == [1, 2]
-
-    def test_a_branch_that_others_have_is_missing_by_them(self, name, tmp_path, wording):
-        other = self.three(tmp_path, 4.0, "other.csv")
-        with wording.refusal(api.InputError, "parts of recordings: one branch"):
-            api.identify([name, other], to={name: "40 s"})
-
-    def test_nothing_left(self, name, wording):
-        with wording.refusal(api.InputError, "parts of recordings: nothing"):
-            api.identify(name, from_="170 s")
-
-    def test_the_warning(self, name, capsys, wording):
-        assert main(["-q", "identify", name, "--from", "20 s"]) == 0
-        wording("parts of recordings: cut", "\n".join(cut_ramps(capsys)))
-
-    def test_a_check_that_sees_no_ramps(self, name, capsys, monkeypatch):
-        """Seeded: then a fragment counts as a ramp, and nothing is said."""
-        monkeypatch.setattr(dzdesign.identify.ramps.cut_ramps, "parts_of_ramps", lambda *_: [])
-        assert main(["-q", "identify", name, "--from", "40 s"]) == 0
-        assert not cut_ramps(capsys)
-        (test,) = json.loads(Path("valve.json").read_text())["sides"]["positive"]["tests"]
-        assert len(test["ramps"]) == 3
+def test_ramps_without_a_rest_between_them_can_be_parted(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    taken = [bench.record(bench.Valve(), seed=seed, rate_Hz=20.0, hold_s=0.0) for seed in range(2)]
+    length = taken[0].time[-1]
+    time = np.concatenate([test.time + place * (length + 0.05) for place, test in enumerate(taken)])
+    u, q, dp = (np.concatenate([getattr(test, name) for test in taken]) for name in ("u", "q", "dp"))
+    bench.write(tmp_path / "two.csv", replace(taken[0], time=time, u=u, q=q, dp=dp))
+    assert main(["-q", "identify", "two.csv", "--from", f"{length:.2f} s", "--meter-lag", "0 s +- 0.01 s"]) == 0
+    (test,) = json.loads(Path("valve.json").read_text())["sides"]["positive"]["tests"]
+    assert len(test["ramps"]) == 1
+    assert test["u_knee_falling_V"] == pytest.approx(bench.Valve().closing, abs=0.003)

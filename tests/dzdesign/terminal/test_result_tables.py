@@ -3,12 +3,15 @@
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from dzdesign.core.artefact_types import THIS_TOOL
+from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.report.lot.summary import FailedValve, LotSummary
 from dzdesign.terminal.page import new_console
+from dzdesign.terminal.tables import gains_most
 from dzdesign.terminal.verification_tables import print_scenarios
 from dzdesign.verify.loop_results import ScenarioResult
 
@@ -67,3 +70,27 @@ def test_the_headline_of_a_batch_counts_calibrated_valves(capsys):
     said = capsys.readouterr().out
     assert "3 calibrated valves of 4" in said and "odd: two share a recording" in said
     assert "warnings: pressure-stuck 1 (V3), onset-hidden 4" in said
+
+
+@pytest.mark.parametrize(
+    ("bound", "offset", "budget", "origin", "scatter", "most"),
+    [
+        ([4.9, 4.7], [4.5, 4.5], 0.09, "repeats", 0.02, "More pressure drops"),
+        ([4.9, 4.7], [4.88, 4.7], 0.09, "repeats", 0.02, "Slower ramps, or lag and zero"),
+        ([4.9, 4.7], [4.88, 4.7], 0.01, "assumed", 0.02, "Repeated ramps"),
+        ([4.9, 4.7], [4.88, 4.7], 0.01, "repeats", 0.02, "More ramps at each pressure drop"),
+        ([4.9, 4.7], [4.88, 4.7], 0.01, "repeats", 0.005, "Slower ramps or a quieter meter"),
+    ],
+)
+def test_identify_says_what_would_raise_the_offset_most(bound, offset, budget, origin, scatter, most):
+    curve = SimpleNamespace(
+        dp_MPa=(1.0, 5.0), u_threshold_V=(5.0, 4.8), u_lower_V=bound, offset_dp_MPa=(1.0, 5.0), offset_V=offset,
+        errors=SimpleNamespace(budget_V=(budget, budget)),
+    )  # fmt: skip
+    basis = SimpleNamespace(repeatability=SimpleNamespace(origin=origin, sd_V=scatter))
+    tests = [SimpleNamespace(u_knee_se_V=0.01)] * 2
+    side = SimpleNamespace(curve=curve, valid_dp_MPa=(1.0, 5.0), certificate=basis, tests=tests)
+    words = gains_most(side, AS_COMPUTED)
+    between = 1e3 * (sum(bound) - sum(offset)) / 2
+    assert "lies 100.0 mV below the threshold at the tests" in words and f"{between:.1f} mV more between" in words
+    assert most in words and words.endswith("would gain most")

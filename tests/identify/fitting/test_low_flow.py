@@ -9,7 +9,6 @@ import pytest
 from dzdesign.core.errors import InputError
 from dzdesign.identify.identification import identify_sides
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.reading.low_flow_table import LowFlowTable
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.low_flow import LowFlow
 
@@ -49,10 +48,10 @@ class Valve:
 
     def reading(self, u_V, dp_MPa, branch="falling", error=0.005):
         flow = float(self.flow(np.array(u_V), dp_MPa, rising=branch == "rising"))
-        row = f"{1e3 * u_V:.0f}{1e3 * dp_MPa:.0f}"
         return LowFlow(
-            source=f"low.csv, row {row}", branch=branch, u_V=u_V, dp_MPa=dp_MPa, q_L_min=flow, q_error_L_min=error
-        )
+            source=f"low-flow reading {1e3 * u_V:.0f}{1e3 * dp_MPa:.0f}", branch=branch, u_V=u_V, dp_MPa=dp_MPa,
+            q_L_min=flow, q_error_L_min=error,
+        )  # fmt: skip
 
 
 SHARP, NOTCHED = Valve(), Valve(notch_V=0.6)
@@ -60,9 +59,8 @@ RAMPS = {valve: [valve.ramp(dp) for dp in PRESSURES] for valve in (SHARP, NOTCHE
 
 
 def identified(valve, rows=(), **options):
-    tables = [LowFlowTable(source="low.csv", sha256="a" * 64, rows=tuple(rows))] if rows else []
     chosen = IdentifyOptions(meter_floor=FLOOR * L_MIN, meter_lag=0.0, meter_lag_tolerance=0.0, **options)
-    model = identify_sides(RAMPS[valve], chosen, None, tables).model
+    model = identify_sides(RAMPS[valve], chosen, None, rows).model
     return model
 
 
@@ -103,9 +101,10 @@ class TestAReadingThatAgrees:
         assert "onset-hidden" in codes(identified(SHARP)) and "onset-hidden" not in codes(after)
         assert "low-flow" not in codes(after)
 
-    def test_is_kept_with_its_file(self):
-        model = identified(SHARP, at_thresholds(SHARP, 0.002))
-        assert model.made_from[-1].source == "low.csv" and len(model.positive.low_flow) == 3
+    def test_is_kept(self):
+        rows = at_thresholds(SHARP, 0.002)
+        kept = identified(SHARP, rows).positive.low_flow
+        assert [row.source for row in kept] == [row.source for row in rows]
 
     def test_says_nothing_where_it_is_below_the_threshold(self):
         """The next closing may be lower than the one that was measured: the bound counts on that, the reading not."""
@@ -157,7 +156,7 @@ class TestAReadingThatAgrees:
         assert side_of(SHARP, rows).certificate == side_of(SHARP, rows[::-1]).certificate
 
 
-class TestATableThatNothingConfirms:
+class TestReadingsThatNothingConfirms:
     """Below the meter's floor the ramps contradict nothing: of another valve no flow at all is right anywhere there."""
 
     @staticmethod
@@ -184,10 +183,6 @@ class TestATableThatNothingConfirms:
 
     def test_is_not_confirmed_by_one_on_opening(self):
         self.assert_unseen(self.rows(0.0, SHARP.reading(thresholds(SHARP)[1] + 0.6, 3.0, "rising")))
-
-    def test_is_not_confirmed_by_another_table(self):
-        other = LowFlow(**{**_fields(confirming(SHARP)), "source": "other.csv, row 2"})
-        self.assert_unseen(self.rows(0.0, other))
 
     def test_of_a_valve_that_opens_a_quarter_of_a_volt_later_is_refused_where_it_could_be_seen(self, wording):
         with wording.refusal(InputError):
@@ -248,7 +243,7 @@ class TestAReadingBelowTheThreshold:
         assert np.ptp(depth) < 1e-5 and depth[0] > 0.5
         assert after.certificate.unseen_below_L_min < 0.03
         warning = next(each for each in model.warnings if each.code == "low-flow")
-        assert "closing" in warning.text and warning.source.startswith("low.csv")
+        assert "closing" in warning.text and warning.source.startswith("low-flow reading")
 
     def test_counts_the_depth_from_the_threshold_at_the_pressure_drop_of_the_one_that_shows_none(self):
         """Seeded: a command below that of 5 MPa was taken for as far below that of 4.75 MPa, which is higher."""
@@ -320,9 +315,8 @@ def test_the_negative_side_has_its_own_readings():
 
     tests = [replace(test, u=-test.u, q=-test.q) for test in RAMPS[SHARP]]
     given = [*at_thresholds(SHARP, 0.002), confirming(SHARP)]
-    rows = tuple(LowFlow(**{**_fields(row), "u_V": -row.u_V}) for row in given)
-    table = LowFlowTable(source="low.csv", sha256="a" * 64, rows=rows)
+    rows = [LowFlow(**{**_fields(row), "u_V": -row.u_V}) for row in given]
     options = IdentifyOptions(meter_floor=FLOOR * L_MIN, meter_lag=0.0, meter_lag_tolerance=0.0)
-    both = identify_sides([*RAMPS[SHARP], *tests], options, None, [table]).model.sides
+    both = identify_sides([*RAMPS[SHARP], *tests], options, None, rows).model.sides
     assert both["negative"].certificate.unseen_below_L_min < 0.05 < both["positive"].certificate.unseen_below_L_min
     assert [row.u_V > 0 for row in both["negative"].low_flow] == [True] * 4 and not both["positive"].low_flow

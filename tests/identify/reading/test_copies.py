@@ -69,12 +69,6 @@ def other_units(columns: Columns) -> Columns:
     return time, u, np.round(q * 0.06, 3) / 0.06, np.round(dp * 145.0377, 1) / 145.0377
 
 
-def resampled(columns: Columns, step: float) -> Columns:
-    time = np.arange(0, columns[0][-1], step)
-    u, q, dp = (np.interp(time, columns[0], column) for column in columns[1:])
-    return time, rounded(u, 1e-4), rounded(q, 0.01), rounded(dp, 1e-3)
-
-
 def without_spike(columns: Columns) -> Columns:
     time, u, q, dp = (column.copy() for column in columns)
     q[1000] = 99.0
@@ -90,8 +84,6 @@ COPIES: dict[str, Callable[[Columns], Columns]] = {
     "every 20th row from the 3rd": every(20, 3),
     "a part": cut,
     "a part, fewer decimals, every 3rd row": lambda columns: every(3)(coarser(cut(columns))),
-    "resampled to a higher rate": lambda columns: resampled(columns, 0.013),
-    "resampled to a lower rate": lambda columns: resampled(columns, 0.1),
     "a spike": without_spike,
     "rows lost": lambda columns: tuple(np.delete(column, slice(700, 720)) for column in columns),
 }
@@ -106,17 +98,7 @@ def test_a_copy_is_found_whichever_stands_first(name, bench):
     for tests in ([one, another, other], [other, another, one]):
         found = find_copy(tests)
         assert found is not None and (found.one, found.other) == (0, 2)
-
-
-def test_the_times_of_what_is_in_both_are_on_the_clock_of_the_later_one():
-    first = recorded(np.random.default_rng(3), ramps=3)
-    whole, part = ramp_test("whole", first), ramp_test("part", cut(first))
-    found = find_copy([whole, part])
-    assert found is not None
-    assert (found.from_s, found.to_s) == pytest.approx((part.time[0], part.time[-1]))
-    found = find_copy([part, whole])
-    assert found is not None
-    assert (found.from_s, found.to_s) == pytest.approx((34.0, 66.0), abs=2 / RATE)
+        assert found.compared - 1 <= found.agree <= found.compared and found.compared > 40
 
 
 @pytest.mark.parametrize(

@@ -48,7 +48,7 @@ def test_a_floor_that_levels_hide_is_seen(tmp_path, monkeypatch):
 
 
 def forget_the_units(monkeypatch):
-    monkeypatch.setattr(identification, "shown_units", lambda tests, options: AS_COMPUTED)
+    monkeypatch.setattr(identification, "units_of", lambda tests: AS_COMPUTED)
 
 
 def take_a_gallon_for_the_imperial_one(monkeypatch):

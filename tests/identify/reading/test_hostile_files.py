@@ -2,6 +2,7 @@
 
 import contextlib
 import gzip
+import itertools
 import json
 import os
 import random
@@ -153,38 +154,41 @@ def test_a_damaged_recording(tmp_path, name):
 
 
 @needs_pipes
-def test_a_pipe_without_a_writer_is_given_up(tmp_path, monkeypatch):
-    monkeypatch.setattr(input_files, "PIPE_PATIENCE_S", 0.1)
+def test_a_pipe_with_a_name_is_refused(tmp_path):
+    """It may have nobody at its other end: whoever opened it would wait for ever."""
     os.mkfifo(tmp_path / "pipe")
     for read in (read_ramp_file, lambda path: read_bytes(path, "plant file")):
-        assert "gave nothing for 0.1 s" in outcome(read, tmp_path / "pipe")
+        assert "is a device, a pipe or a socket, expected a file" in outcome(read, tmp_path / "pipe")
+
+
+def poured(pieces) -> tuple[Path, threading.Thread]:
+    """Return a pipe as a shell gives it, and the thread that writes into it."""
+    end, start = os.pipe()
+
+    def pour():
+        with contextlib.suppress(BrokenPipeError), open(start, "wb", buffering=0) as out:
+            for piece in pieces:
+                out.write(piece)
+
+    writer = threading.Thread(target=pour)
+    writer.start()
+    return Path(f"/dev/fd/{end}"), writer
 
 
 @needs_pipes
 @pytest.mark.parametrize("name", ["csv", "csv.gz", "mat 5", "parquet"])
-def test_a_recording_through_a_pipe(tmp_path, name):
-    pipe = tmp_path / "pipe"
-    os.mkfifo(pipe)
-    writer = threading.Thread(target=lambda: pipe.write_bytes(SOUND[name]))
-    writer.start()
+def test_a_recording_through_a_pipe(name):
+    pipe, writer = poured([SOUND[name]])
     assert read_ramp_file(pipe).u.size == 30
     writer.join()
 
 
 @needs_pipes
-def test_a_pipe_without_an_end(tmp_path, monkeypatch):
+def test_a_pipe_without_an_end(monkeypatch):
     monkeypatch.setattr(input_files, "MOST_PIPED", 1 << 22)
-    pipe = tmp_path / "pipe"
-    os.mkfifo(pipe)
-
-    def pour():
-        with contextlib.suppress(BrokenPipeError), open(pipe, "wb", buffering=0) as out:
-            while True:
-                out.write(b"1,2,3,4\n" * 10_000)
-
-    writer = threading.Thread(target=pour)
-    writer.start()
+    pipe, writer = poured(itertools.repeat(b"1,2,3,4\n" * 10_000))
     assert "is a pipe with more than 4 MiB" in outcome(read_ramp_file, pipe)
+    os.close(int(pipe.name))
     writer.join(timeout=10)
     assert not writer.is_alive()
 
@@ -193,8 +197,8 @@ def test_a_pipe_without_an_end(tmp_path, monkeypatch):
 @pytest.mark.parametrize("device", ["/dev/zero", "/dev/urandom", "/dev/null", "/dev/tty"])
 def test_a_device(tmp_path, device):
     (tmp_path / "link").symlink_to(device)
-    assert "is a device or a socket, expected a file" in outcome(read_ramp_file, tmp_path / "link")
-    assert "is a device or a socket, expected a file" in outcome(read_bytes, Path(device), "plant file")
+    assert "is a device, a pipe or a socket, expected a file" in outcome(read_ramp_file, tmp_path / "link")
+    assert "is a device, a pipe or a socket, expected a file" in outcome(read_bytes, Path(device), "plant file")
 
 
 def test_links_in_a_loop_and_folders(tmp_path):

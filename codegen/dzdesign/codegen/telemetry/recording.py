@@ -22,9 +22,9 @@ from dzdesign.codegen.telemetry.frame import (
 )
 from dzdesign.core.artefact_files import MANIFEST_NAME, TOOL, note_written, read_bytes, sha256_of
 from dzdesign.core.artefact_reading import read_artefact
-from dzdesign.core.disk_sync import sync_folder
 from dzdesign.core.errors import InputError
 from dzdesign.core.input_files import reason_of
+from dzdesign.core.placing import sync_folder
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest
 

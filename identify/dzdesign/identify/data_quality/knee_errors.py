@@ -74,7 +74,7 @@ def _bent(test: TestResult, left: float, declared: tuple[float, float]) -> Findi
     of_rising = test.u_knee_rising_se_V == test.u_knee_se_V
     straight = (test.straight_rising if of_rising else test.straight_falling) or declared
     (low, high), asked = ([100 * share for share in shares] for shares in (straight, declared))
-    widened = f" (--knee-window {asked[0]:.3g}-{asked[1]:.3g}, widened as far as a line goes)"
+    widened = f" (--knee-window {asked[0]:.3g}-{asked[1]:.3g}, widened)"
     widened = widened if straight != declared else ""
     se_mV = 1e3 * test.u_knee_se_V
     return warn("bend", test.source, knee_se_mV=se_mV, low=low, high=high, widened=widened, left_mV=left * se_mV)

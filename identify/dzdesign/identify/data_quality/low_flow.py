@@ -23,12 +23,12 @@ def about_low_flow(side: SideModel, lowered: Mapping[Guard, Lowered]) -> Iterato
         return
     guard, level = side.certificate.guard, side.certificate.level_L_min
     unseen = unseen_of_curve(side.low_flow, guard, side.curve, level)
-    for table in unseen.unconfirmed:
+    if unseen.unconfirmed:
         middle = len(side.tests) // 2
         recorded = side.tests[middle].recorded
         shown = recorded.closing if guard == "closing" else recorded.opening
         yield warn(
-            "low-flow", table, "unconfirmed",
+            "low-flow", None, "unconfirmed",
             branch=guard, level_L_min=level, flow_L_min=ASKED * level, dp_MPa=side.curve.dp_MPa[middle],
             u_V=shown.command_at(ASKED * level) or shown.u_V[-1],
         )  # fmt: skip

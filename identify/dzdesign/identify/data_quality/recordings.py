@@ -56,8 +56,6 @@ def _about_one(test: RampTest) -> Iterator[Finding]:
         yield warn("side-refused", test.source, side=test.side_without_dp, reason=reason)
     for kind, samples in test.missing.items():
         yield warn("missing-samples", test.source, kind, samples=samples)
-    if test.cut:
-        yield warn("cut-ramp", test.source, ramps="; ".join(test.cut))
     if test.undeclared_dither:
         yield warn("dither-undeclared", test.source, peak_V=test.undeclared_dither)
     if test.dither_averaged:

@@ -4,8 +4,8 @@ Flow grows with the command. So where a reading shows flow at a command below a 
 command: the threshold is lowered to the highest command below it that a reading shows none at, and so are those of all
 tests, for one edge has made them. And where a reading shows at most so much at the threshold or above it, no more flows
 at any bound, which lies below the threshold by all that the next closing may differ; unless another reading shows more
-at a lower command. That counts only of a table that the ramps confirm: below the meter's floor they contradict nothing,
-neither a wrong unit nor a table of another valve.
+at a lower command. That counts only beside a reading that the ramps confirm: below the meter's floor they contradict
+nothing, neither a wrong unit nor readings of another valve.
 """
 
 from collections.abc import Sequence
@@ -43,8 +43,8 @@ class Unseen:
     below_L_min: float
     #: The tests that no reading tells of.
     missing: tuple[int, ...] = ()
-    #: Tables of which no reading lies where the ramps could confirm it.
-    unconfirmed: tuple[str, ...] = ()
+    #: Whether no reading lies where the ramps could confirm it.
+    unconfirmed: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -132,7 +132,7 @@ def _refuse_another_valve(row: LowFlow, dp: np.ndarray, guarding: Guarding, grou
             raise InputError(
                 worded(
                     "{source} has {flow:.3g L/min} at {u:.4g V} and {at:.3g MPa}, but the ramps allow {low:.3g #L/min} "
-                    "to {high:.3g L/min} there; check the units and the branch, and whether the row belongs to this "
+                    "to {high:.3g L/min} there; check the units and the branch, and whether it was taken at this "
                     "valve",
                     source=row.source, flow=row.q_L_min, u=row.u_V, at=row.dp_MPa, low=least, high=most,
                 )
@@ -187,7 +187,7 @@ def _open_below(row: LowFlow, branch: Branch, threshold: float, least: float) ->
     return worded(
         "{source} shows at least {flow:.3g L/min} at {u:.4g V} and {at:.3g MPa}. This command lies below the threshold "
         "on {branch} from the ramps, {threshold:.4g V}, and a flow of up to {least:.3g L/min} counts as no flow; add a "
-        "row of {branch} at a lower command with no more flow than that, or declare the allowed flow by --zero-flow",
+        "reading of {branch} at a lower command with no more flow, or declare the allowed flow by --zero-flow",
         source=row.source, flow=row.at_least_L_min, u=row.u_V, at=row.dp_MPa, branch=IN_WORDS[branch],
         threshold=threshold, least=least,
     )  # fmt: skip
@@ -204,12 +204,12 @@ def unseen_of_curve(rows: Sequence[LowFlow], guard: Guard, curve: CertifiedCurve
     """Return the flow at a guard's bounds below which nothing is known.
 
     It is the meter's level unless a reading at every test, at its threshold or above, shows that no more flows there,
-    of a table that the ramps confirm in their own range; and no other reading shows more at a lower command.
+    one of which the ramps confirm in their own range; and no other reading shows more at a lower command.
     """
     branch = BRANCH_OF.get(guard)
     if branch is None or not rows:
         return Unseen(below_L_min=level_L_min, missing=tuple(range(len(curve.dp_MPa))) if rows else ())
-    confirmed = {row.table for row in rows if _confirms(row, branch, curve, level_L_min)}
+    confirmed = any(_confirms(row, branch, curve, level_L_min) for row in rows)
     nodes, thresholds = np.array(curve.dp_MPa), np.array(curve.u_threshold_V)
     found, missing = [], []
     for test, (dp, threshold) in enumerate(zip(curve.dp_MPa, curve.u_threshold_V, strict=False)):
@@ -217,7 +217,7 @@ def unseen_of_curve(rows: Sequence[LowFlow], guard: Guard, curve: CertifiedCurve
             flow
             for row in rows
             if (flow := _at_most(row, rows, branch, dp)) < level_L_min  # the meter tells as much
-            and row.table in confirmed and row.shows_none_on(branch) and row.is_at(dp)
+            and confirmed and row.shows_none_on(branch) and row.is_at(dp)
             and row.u_V >= max(threshold, _continued(row.dp_MPa, nodes, thresholds)) - ROUNDING_V
         ]  # fmt: skip
         if told:
@@ -234,7 +234,7 @@ def unseen_of_curve(rows: Sequence[LowFlow], guard: Guard, curve: CertifiedCurve
     return Unseen(
         below_L_min=min(level_L_min, max([least, *more])),
         missing=tuple(missing),
-        unconfirmed=tuple(sorted({row.table for row in rows} - confirmed)),
+        unconfirmed=not confirmed,
     )
 
 

@@ -1,4 +1,4 @@
-"""Tests of which some have a branch that others lack, refused with the reason: an option, or a pressure on its way."""
+"""Tests of which some have a branch that others lack, refused with the reason, such as a pressure on its way."""
 
 from collections.abc import Sequence
 
@@ -25,16 +25,7 @@ def refuse_mixed_branches(described: Sequence[DescribedTest], recordings: Sequen
         if not lacking or len(lacking) == len(described):
             continue
         item, remedy = lacking[0], worded("record every pressure drop up and down, or leave that file out")
-        by_option = next((part for part in item.left_out if part.reason == "option"), None)
-        if by_option is not None:
-            remedy = worded(
-                "--from and --to leave out {start:.1f} to {end:.1f} s, which holds the branch; choose seconds before "
-                "and after a whole ramp, or leave that file out",
-                start=by_option.from_s,
-                end=by_option.to_s,
-            )
-        else:
-            remedy = _pressure_on_its_way(item, column, described, recordings) or remedy
+        remedy = _pressure_on_its_way(item, column, described, recordings) or remedy
         raise InputError(
             worded(
                 "'{source}' has no {name} branch while other ramp tests have one; {remedy}",
@@ -67,7 +58,7 @@ def _pressure_on_its_way(
     settled = _settles_at(recording, item.dp)
     return worded(
         "in '{source}' the pressure drop was {dp:.3g #MPa} on that branch, and {level:.3g MPa} on the other one{when}, "
-        "so it counts as a test of its own. Start the ramp after the pressure has settled and record again, or leave "
+        "so it is another test. Start the ramp after the pressure has settled and record again, or leave "
         "that file out",
         source=source,
         dp=other.dp / MPA,

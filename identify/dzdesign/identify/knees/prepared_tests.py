@@ -37,7 +37,7 @@ from dzdesign.identify.ramps.sweep_pressure import NO_PRESSURE
 from dzdesign.identify.reading.column_labels import PER_CENT
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.reading.series_order import with_clock_of_series
-from dzdesign.identify.reading.units_of_columns import shown_units
+from dzdesign.identify.reading.units_of_columns import units_of
 from dzdesign.identify.valve.left_out import left_out_in_words
 
 logger = logging.getLogger(__name__)
@@ -67,7 +67,7 @@ def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> Descr
     pooled = pool_ramps(ramps if lag.origin != "identified" else split_recordings(tests, options, lag.seconds))
     pooled = _in_order_of_pressure(pooled)
     left_out = dict.fromkeys(part for item in pooled for part in item.left_out)
-    for line in left_out_in_words(left_out, shown_units(tests, options)):
+    for line in left_out_in_words(left_out, units_of(tests)):
         logger.info("%s", line)
     _refuse_what_shows_no_dead_zone(pooled, options)
     floor = options.meter_floor if options.meter_floor is not None else found_floor(pooled, options)

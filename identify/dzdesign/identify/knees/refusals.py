@@ -66,7 +66,7 @@ def refuse_two_signs_of_flow(ramps: Sequence[Ramp]) -> None:
     raise InputError(
         worded(
             "the flow reaches {above:+.3g L/min} in '{one}' and {below:+.3g L/min} in '{other}', at commands of one "
-            "sign: two sides of the valve{column}. Give the command its sign, or each side a file of its own",
+            "sign. These are two sides of the valve{column}. Give the command its sign, or each side a file of its own",
             above=above / L_MIN,
             one=name_of_ramp(one),
             below=below / L_MIN,

@@ -16,7 +16,6 @@ import numpy as np
 
 from dzdesign.core.artefact_files import open_bytes, sha256_of_file
 from dzdesign.core.errors import InputError
-from dzdesign.core.input_files import check_address_space
 from dzdesign.core.recorded_units import Quantity, Unit
 from dzdesign.identify.reading.binary.array_table import read_binary_table
 from dzdesign.identify.reading.binary.registry import LONGEST_MARK, format_of
@@ -88,7 +87,6 @@ def read_ramp_file(
         Naming file, and row and column where there is one.
     """
     path = Path(path)
-    check_address_space("reading recordings")
     with open_bytes(path, "ramp file") as file:
         sha256 = sha256_of_file(file)
         recording = _read_recording(

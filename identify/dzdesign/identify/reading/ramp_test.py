@@ -81,8 +81,6 @@ class RampTest:
     started: float | None = None
     #: What the engineer has left out of the file.
     left_out: tuple[LeftOut, ...] = ()
-    #: Ramps that this cuts, each with the branches of it that are lost: ``ramp 2, 12.3 to 62.1 s (falling)``.
-    cut: tuple[str, ...] = ()
     #: Times before which the command was on the other side of zero, whose samples are left out, s.
     crossed: tuple[float, ...] = ()
     #: Declared range of the signal of Q, m³/s; and the least and the largest command whose flow it could not show, V.

@@ -52,19 +52,11 @@ def on_one_clock(tests: Sequence[RampTest]) -> bool:
 
 
 def runs_back(tests: Sequence[RampTest]) -> tuple[RampTest, RampTest] | None:
-    """Return two recordings, one and the next, of which the next began before that ended, by the dates that they state.
+    """Return two recordings, one and the next, of which the next began before that ended, by dates on one clock.
 
-    None where there are no such.
+    None where there are no such, or no date.
     """
-    dated = [(test, test.stamp.has_zone) for test in tests if test.stamp is not None]
-    return next(
-        (
-            (one, other)
-            for (one, zone), (other, other_zone) in pairwise(dated)
-            if zone == other_zone and began(other) < ended(one) - ROUNDING
-        ),
-        None,
-    )
+    return next(((one, other) for one, other in pairwise(tests) if began(other) < ended(one) - ROUNDING), None)
 
 
 def began(test: RampTest) -> float:

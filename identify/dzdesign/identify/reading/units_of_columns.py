@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from dzdesign.core.chosen_units import LARGEST_FACTOR, SMALLEST_FACTOR
 from dzdesign.core.recorded_units import (
     CommandUnit,
     FlowUnit,
@@ -18,11 +17,12 @@ from dzdesign.core.recorded_units import (
 from dzdesign.core.signal_ranges import read_signal_range
 from dzdesign.core.units import measures, si_factor
 from dzdesign.identify.constants import L_MIN, MPA
-from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.column_labels import PRESSURES, Column
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.reading.scaling import Scaling, scaling_of
 
+#: How many of a unit are 1 V, MPa or L/min, where numbers in it can be read: 1 MPa is 1e7 Ba.
+SMALLEST_FACTOR, LARGEST_FACTOR = 1e-9, 1e9
 #: What stands in front of one.
 NOT_OF_A_UNIT = " +-0123456789.,"
 
@@ -45,12 +45,6 @@ def units_of(tests: Sequence[RampTest]) -> RecordedUnits:
         for name, units in test.units.items():
             every[name] = (*every.get(name, ()), *units)
     return common_units(every)
-
-
-def shown_units(tests: Sequence[RampTest], options: IdentifyOptions) -> RecordedUnits:
-    """Return the units in which what is found in recordings is shown: theirs, or those that the options choose."""
-    recorded = units_of(tests)
-    return recorded if options.units is None else options.units.over(recorded, options.u_max)
 
 
 def pressure_unit(text: str) -> PressureUnit | None:

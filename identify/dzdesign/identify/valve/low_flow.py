@@ -21,7 +21,7 @@ SmallFlow = Annotated[float, quantity("L/min", ge=0, le=1e6)]
 class LowFlow:
     """One reading by hand at a constant command and pressure drop, by volume and time or by piston speed and area."""
 
-    source: Annotated[str, Meta(description="Table and row of the reading.")]
+    source: Annotated[str, Meta(description="Number of the reading, as given.")]
     branch: Annotated[
         Branch,
         Meta(description="Direction from which the command was approached: rising from below, falling from above."),
@@ -30,11 +30,6 @@ class LowFlow:
     dp_MPa: Annotated[PressureDrop, Meta(description="Pressure drop across the metering edge.")]
     q_L_min: Annotated[SmallFlow, Meta(description="Measured flow, leak included.")]
     q_error_L_min: Annotated[SmallFlow, Meta(description="Largest error of the measured flow.")]
-
-    @property
-    def table(self) -> str:
-        """The table that it stands in."""
-        return self.source.rpartition(", row ")[0] or self.source
 
     @property
     def at_least_L_min(self) -> float:

@@ -146,7 +146,7 @@ class SideModel:
     certificate: Annotated[BoundsBasis, Meta(description="Basis of the lower bounds.")]
     low_flow: Annotated[
         tuple[LowFlow, ...],
-        Meta(description="Flows measured by hand below the meter's floor, from the table of --low-flow."),
+        Meta(description="Flows measured by hand below the meter's floor, by --low-flow."),
     ]
     active_constraints: Annotated[
         tuple[str, ...], Meta(description="Constraints that are active in the fits, in words.")

@@ -1,4 +1,4 @@
-"""A valve on a bench, recorded in the order of a plan: made with NumPy alone, no code of the plan or of the fit."""
+"""A valve on a bench, recorded in the order of a series: made with NumPy alone, no code of the fit."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from dzdesign.identify.reading.ramp_test import RampTest
 
 
 @dataclass(frozen=True, kw_only=True)
-class PlannedBench:
+class SeriesBench:
     """A valve whose closing threshold falls straight with the pressure drop, and its bench; V, L/min, MPa, s.
 
     The numbers hold at 1 MPa; flow grows with the root of the pressure drop, and the meter is a first-order filter.
@@ -58,6 +58,6 @@ class PlannedBench:
     def distance(self, valve):
         """Return the mean distance of the certified offset below the threshold over the tested pressure drops, V."""
         curve = valve.positive.curve
-        nodes = np.array(curve.dp_MPa)
+        nodes = np.array(curve.offset_dp_MPa)
         dp = np.linspace(nodes[0], nodes[-1], 201)
-        return float(np.mean(self.threshold(dp) - np.interp(dp, nodes, curve.u_offset_V)))
+        return float(np.mean(self.threshold(dp) - np.interp(dp, nodes, curve.offset_V)))
