@@ -23,10 +23,10 @@ from dzdesign.core.errors import InputError
 from dzdesign.core.units import SI_UNIT, parse_quantity, si_factor
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.signal_text import parse_signal
+from dzdesign.identify.reading import text_file
 from dzdesign.identify.reading.binary import reader_process
 from dzdesign.identify.reading.binary.reader_server import Request
 from dzdesign.identify.reading.ramp_files import read_ramp_file
-from dzdesign.identify.reading.text import encoding
 from tests.identify.reading.hostile_files import BINARIES, CSV, TEXTS, write
 from tests.identify.reading.test_file_formats import GOOD
 
@@ -65,7 +65,7 @@ def largest_memory(reset: bool = False) -> int:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [*TEXTS, *BINARIES])
 def test_a_hostile_recording(tmp_path, monkeypatch, name):
-    monkeypatch.setattr(encoding, "FREE_BYTES", 1 << 22)  # a bomb is refused a little sooner
+    monkeypatch.setattr(text_file, "FREE_BYTES", 1 << 22)  # a bomb is refused a little sooner
     path, (_, words) = write(name, tmp_path), {**TEXTS, **BINARIES}[name]
     text = name in TEXTS
     memory = largest_memory(reset=True)

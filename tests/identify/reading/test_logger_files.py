@@ -1,4 +1,4 @@
-"""Recordings as loggers write them: init says what is what, identify finds the valve, block by block as at once."""
+"""Recordings as loggers write them: init says what is what, identify finds the valve."""
 
 import gzip
 import json
@@ -12,7 +12,6 @@ from dzdesign.command_line.cli import main
 from dzdesign.core.errors import InputError
 from dzdesign.identify.reading.proposed_columns import propose_columns
 from dzdesign.identify.reading.ramp_files import read_ramp_file
-from dzdesign.identify.reading.text import table_reader
 from tests.dzdesign.command_line.test_bad_input import csv
 from tests.identify.reading.logger_files import (
     DP,
@@ -70,7 +69,7 @@ def test_init_then_identify(here, name):
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_read_as_it_is_and_in_pieces(here, monkeypatch, name):
+def test_read_as_it_is_and_packed(here, name):
     make, options = FILES[name]
     Path("ramp.csv").write_bytes(make())
     columns = {name: column.label for name, column in propose_columns(Path("ramp.csv"), {}).proposed.items()}
@@ -80,11 +79,9 @@ def test_read_as_it_is_and_in_pieces(here, monkeypatch, name):
         columns = parse_columns(options[1])
     test = read(make(), columns=columns)
     assert_is_the_ramp(test)
-    for content, size in ((make(), 4096), (make(), 4097), (gzip.compress(make()), 5000)):
-        monkeypatch.setattr(table_reader, "PIECE_BYTES", size)
-        again = read(content, columns=columns)
-        for one in ("time", "u", "q", "dp"):
-            np.testing.assert_array_equal(getattr(again, one), getattr(test, one))
+    again = read(gzip.compress(make()), columns=columns)
+    for one in ("time", "u", "q", "dp"):
+        np.testing.assert_array_equal(getattr(again, one), getattr(test, one))
 
 
 # encodings
@@ -100,8 +97,7 @@ def test_an_encoding_is_told_and_logged(here, caplog, encoding):
     assert "the header was found in row 2" in caplog.text
 
 
-def test_an_encoding_that_shows_late(here, monkeypatch):
-    monkeypatch.setattr(table_reader, "PIECE_BYTES", 4096)
+def test_an_encoding_that_shows_late(here):
     plain = csv(ROWS).encode()
     assert_is_the_ramp(read(plain + "# Öl\n".encode("cp1252")))
     assert_is_the_ramp(read(plain + "# Öl\n".encode()))
@@ -245,11 +241,10 @@ def test_thousands_that_look_like_decimals_are_refused(here, content, words):
     assert words in refusal(content)
 
 
-def test_thousands_that_the_same_column_shows_further_down(here, monkeypatch):
+def test_thousands_that_the_same_column_shows_further_down(here):
     lines = kilopascals(cell="{:,.1f}").decode().split("\n")
     first = [line.replace(",0;", ";") if index > 500 else line for index, line in enumerate(lines)]
     last = [line.replace(",0;", ";") if index < 500 else line for index, line in enumerate(lines)]
-    monkeypatch.setattr(table_reader, "PIECE_BYTES", 4096)
     assert read(text(*first[:-1])).dp[[0, -1]] == pytest.approx([2e6, 2.005e6])
     assert read(text(*last[:-1])).dp[[0, -1]] == pytest.approx([2e6, 2.005e6])
     whole = [f"{n};5;2.001;3" for n in range(2000)]
@@ -275,11 +270,9 @@ def test_whole_numbers_beside_decimals_of_their_size_stay(here, cells):
 
 
 @pytest.mark.parametrize("separator", [",", ";", "\t"])
-def test_three_digits_behind_a_point_stay_decimals(here, monkeypatch, separator):
+def test_three_digits_behind_a_point_stay_decimals(here, separator):
     labels = separator.join(["t_s", "u_V", "dP_MPa", "Q_Lmin"])
     lines = rows(TIME, U, [f"{2.001:.3f}"] * TIME.size, Q, separator=separator, comma=False)
-    np.testing.assert_allclose(read(text(labels, *lines)).dp, 2.001e6)
-    monkeypatch.setattr(table_reader, "PIECE_BYTES", 4096)
     np.testing.assert_allclose(read(text(labels, *lines)).dp, 2.001e6)
 
 
@@ -339,9 +332,8 @@ def test_milliseconds_beside_a_time_of_day_are_not_passed_over(here):
     assert_is_the_ramp(read(whole))
 
 
-def test_stamps_in_pieces_count_from_the_first_row_of_the_file(here, monkeypatch):
+def test_stamps_count_from_the_first_row_of_the_file(here):
     content = text("time;u [V];dP [MPa];Q [l/min]", *rows(stamps("%d.%m.%Y %H:%M:%S,"), U, DP, Q))
-    monkeypatch.setattr(table_reader, "PIECE_BYTES", 4096)
     assert_is_the_ramp(read(content))
     blank = content.replace(START.strftime("\n%d.%m.%Y %H:%M:%S,163").encode(), b"\n", 1)
     assert_is_the_ramp(read(blank), np.arange(TIME.size) != 1)

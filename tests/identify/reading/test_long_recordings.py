@@ -1,7 +1,5 @@
-"""Recordings of many rows: thinned without moving a knee; text in pieces is what it is at once."""
+"""Recordings of many rows: thinned without moving a knee; a fault far down is found in its row."""
 
-import dataclasses
-import gzip
 import os
 import threading
 import tracemalloc
@@ -14,7 +12,6 @@ from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading import thinning
 from dzdesign.identify.reading.ramp_files import ramp_file_bytes, read_ramp_file
 from dzdesign.identify.reading.ramp_test import RampTest
-from dzdesign.identify.reading.text import table_reader
 from dzdesign.identify.reading.thinning import thin
 from tests.identify.reading.test_dirty_recordings import changed, jittered, spiked, staircase
 from tests.identify.reading.test_ramp_files import assert_is_the_ramp, table
@@ -140,35 +137,6 @@ def test_parts_that_are_thinned_one_after_the_other_make_no_difference(monkeypat
     np.testing.assert_array_equal(thin(rows).rows, at_once.rows)
 
 
-def assert_same(one: RampTest, other: RampTest) -> None:
-    for field in dataclasses.fields(RampTest):
-        np.testing.assert_array_equal(getattr(one, field.name), getattr(other, field.name))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
-@pytest.mark.parametrize(
-    "spoil",
-    [
-        lambda text: text,
-        lambda text: "# oil at 40 °C\n\n" + text + "# the end",
-        lambda text: text.replace("\n", ",\n").replace("\n0.12,", "\n,", 1).replace(",1,", ",nan,", 1),
-        lambda text: text.replace(",", ";").replace(".", ","),
-        lambda text: text.replace(",", "  "),
-        lambda text: "\ufeff" + text,
-    ],
-)
-def test_text_read_in_pieces_is_text_read_at_once(tmp_path, monkeypatch, spoil, end):
-    content = spoil(table()).replace("\n", end).encode()
-    for name, data in (("a.csv", content), ("a.csv.gz", gzip.compress(content))):
-        (tmp_path / name).write_bytes(data)
-        at_once = read_ramp_file(tmp_path / name)
-        for size in (64, 65, 66, 67, 301):
-            with monkeypatch.context() as context:
-                context.setattr(table_reader, "PIECE_BYTES", size)
-                assert_same(read_ramp_file(tmp_path / name), at_once)
-
-
 @pytest.mark.parametrize(
     "spoil",
     [
@@ -181,8 +149,7 @@ def test_text_read_in_pieces_is_text_read_at_once(tmp_path, monkeypatch, spoil, 
     ],
 )
 @pytest.mark.parametrize("before", ["", "# one\r\n\r\n"])
-def test_a_fault_in_a_later_piece_is_found_in_its_row(tmp_path, monkeypatch, spoil, before, wording):
-    monkeypatch.setattr(table_reader, "PIECE_BYTES", 128)
+def test_a_fault_far_below_the_header_is_found_in_its_row(tmp_path, spoil, before, wording):
     (tmp_path / "a.csv").write_bytes(before.encode() + "\n".join(spoil(table().splitlines())).encode())
     with wording.refusal(InputError):
         read_ramp_file(tmp_path / "a.csv")
@@ -204,9 +171,8 @@ def test_a_pipe_is_read_once(tmp_path):
     writer.join()
 
 
-def test_memory_is_a_few_times_the_file(tmp_path, monkeypatch):
+def test_memory_is_a_few_times_the_file(tmp_path):
     """Of what Python and NumPy take; `benchmarks/identify/reading.py` measures the whole process."""
-    monkeypatch.setattr(table_reader, "PIECE_BYTES", 1 << 16)
     test = long_ramp()
     columns = {"time_s": test.time, "u_V": test.u, "Q_Lmin": test.q / L_MIN, "dP_MPa": test.dp / 1e6}
     content = ramp_file_bytes(columns, (), compress=False)

@@ -14,7 +14,7 @@ from dzdesign.core.errors import InputError, quoted
 from dzdesign.identify.constants import L_MIN, LARGEST_DP, MPA, SMALLEST_DP
 from dzdesign.identify.reading.column_labels import Column, split_label
 from dzdesign.identify.reading.scaling import scaling_of
-from dzdesign.identify.reading.text.encoding import read_text
+from dzdesign.identify.reading.text_file import read_text
 from dzdesign.identify.valve.low_flow import Branch, LowFlow
 
 #: Rows and columns that no table made by hand exceeds, and characters of a cell that a message quotes.

@@ -33,7 +33,7 @@ from dzdesign.identify.reading.missing_values import (
 from dzdesign.identify.reading.ramp_test import RampTest, Switch
 from dzdesign.identify.reading.scaling import Scaling, scaling_of
 from dzdesign.identify.reading.table import AND, QUOTED_CHARACTERS, Table
-from dzdesign.identify.reading.text.table_reader import read_text_table
+from dzdesign.identify.reading.text_file import read_text_table
 from dzdesign.identify.reading.thinning import thin
 from dzdesign.identify.reading.time_stamps import Start
 from dzdesign.identify.reading.units_of_columns import units_of_columns
