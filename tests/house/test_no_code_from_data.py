@@ -20,13 +20,12 @@ LOADING = ("ctypes", "cffi", "_ctypes", "numpy.ctypeslib", "np.ctypeslib")
 #: Where libraries are loaded: the system's own, and what is run as a process of its own.
 LOADS = {
     "core/dzdesign/core/folder_swap.py",
-    "dzdesign/dzdesign/batch/parent_watch.py",
+    "core/dzdesign/core/processes/workers.py",
     "verify/dzdesign/verify/toolchain/library_server.py",
 }
 #: Where programs are started: by their full path, and with a time to end.
 STARTS = {
     "core/dzdesign/core/processes/running.py",
-    "identify/dzdesign/identify/reading/binary/reader_process.py",
     "verify/dzdesign/verify/toolchain/compiled_library.py",
 }
 

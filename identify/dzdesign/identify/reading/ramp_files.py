@@ -18,8 +18,7 @@ from dzdesign.core.artefact_files import open_bytes, sha256_of_file
 from dzdesign.core.errors import InputError
 from dzdesign.core.input_files import check_address_space
 from dzdesign.core.recorded_units import Quantity, Unit
-from dzdesign.identify.reading.binary.array_table import read_binary_table
-from dzdesign.identify.reading.binary.registry import LONGEST_MARK, format_of
+from dzdesign.identify.reading.binary_table import LONGEST_MARK, format_of, read_binary_table
 from dzdesign.identify.reading.channel_clocks import lay_on_one_clock, refuse_an_early_end
 from dzdesign.identify.reading.clock import ASSUMED_MS, clock_doubt, may_count_ms, never_back, read_times_of_day
 from dzdesign.identify.reading.column_labels import PRESSURES, QUANTITY_OF_COLUMN, Column, find_columns
