@@ -7,9 +7,9 @@ import pytest
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.ramps.command import despiked, lagged_command
+from dzdesign.identify.ramps.command import lagged_command
 from dzdesign.identify.reading.ramp_files import ramp_file_bytes, read_ramp_file
-from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.reading.ramp_test import RampTest, despiked
 from tests.support.repeatable_valves import identify
 from tests.support.synthetic import L_MIN, Truth, synthetic_ramp
 

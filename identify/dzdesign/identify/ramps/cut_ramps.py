@@ -11,7 +11,7 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.constants import FULL_SWEEP
-from dzdesign.identify.ramps.command import despiked, sweep_direction
+from dzdesign.identify.ramps.command import sweep_direction
 from dzdesign.identify.ramps.sides import AT_REST, tests_of_side
 from dzdesign.identify.ramps.splitting import Ramp, split_ramps
 from dzdesign.identify.ramps.sweep_pressure import FIRST_FLOW, stretches
@@ -73,7 +73,7 @@ def _part(ramp: Ramp, side: str, time: np.ndarray, inside: np.ndarray) -> PartOf
 
 def _branches(ramp: Ramp, left: np.ndarray) -> Iterator[tuple[str, np.ndarray, bool]]:
     """Yield name, rows and whether the rows that are left show a threshold, of each branch of a ramp."""
-    u, direction = despiked(ramp.test.u), sweep_direction(ramp.test.u)
+    u, direction = ramp.test.smooth, sweep_direction(ramp.test.u)
     full = float(np.quantile(ramp.test.q, 0.99))
     first = (ramp.test.q > FIRST_FLOW[0] * full) & (ramp.test.q < FIRST_FLOW[1] * full)
     for branch in ramp.branches:

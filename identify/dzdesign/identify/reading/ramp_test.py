@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -27,7 +28,16 @@ class Switch:
         return self.values[int(np.searchsorted(self.changes, time, side="right")) % 2]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+def despiked(u: np.ndarray) -> np.ndarray:
+    """Return the running median of three: a single sample that stands out is gone, a step stays where it was."""
+    if u.size < 3:
+        return u
+    left, middle, right = u[:-2], u[1:-1], u[2:]
+    inner = np.maximum(np.minimum(left, middle), np.minimum(np.maximum(left, middle), right))
+    return np.concatenate([u[:1], inner, u[-1:]])
+
+
+@dataclass(frozen=True, kw_only=True)
 class RampTest:
     """One recorded ramp test in SI units, read-only.
 
@@ -105,6 +115,18 @@ class RampTest:
             if array.shape != self.time.shape or array.ndim != 1:
                 raise ValueError("the columns of a ramp test are vectors of one length")
             array.flags.writeable = False
+
+    @cached_property
+    def smooth(self) -> np.ndarray:
+        """The command without single samples that stand out, V (N,)."""
+        smooth = despiked(self.u)
+        smooth.flags.writeable = False
+        return smooth
+
+    @cached_property
+    def top(self) -> float:
+        """The largest command without such samples, V."""
+        return float(self.smooth.max())
 
     def unseen_top(self, least: float) -> float:
         """Return the largest command of rows without a flow, V; 0 unless it is more than `least` above all others."""
