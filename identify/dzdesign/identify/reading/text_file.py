@@ -315,9 +315,12 @@ def _split(line: str, separator: str) -> list[str]:
     if separator == BLANKS:
         # A unit in brackets belongs to the word before it. Of a bracket that is never closed only so much is looked
         # at: a long header of them would take hours. A line of blanks that only Unicode knows has a cell, too.
-        return re.findall(r"[^\s\[(]+(?:\s{0,40}[\[(][^\])]{0,80}[\])])?", line) or [line]
-    cells = next(csv.reader([line], delimiter=separator, skipinitialspace=True)) if '"' in line else None
-    return [clean_label(cell) for cell in (line.split(separator) if cells is None else cells)]
+        cells = re.findall(r"[^\s\[(]+(?:\s{0,40}[\[(][^\])]{0,80}[\])])?", line) or [line]
+    elif '"' in line:
+        cells = next(csv.reader([line], delimiter=separator, skipinitialspace=True))
+    else:
+        cells = line.split(separator)
+    return [clean_label(cell) for cell in cells]
 
 
 def _is_value(cell: str) -> bool:
