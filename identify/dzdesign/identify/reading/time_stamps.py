@@ -240,11 +240,10 @@ def _days_since_the_first(dates: list[str], where: str) -> dict[str, float]:
 def _days(date: str) -> dict[str, int]:
     """Return format -> days, for each format that a date can be read in."""
     month = re.search(MONTH, date)
+    formats: tuple[str, ...] = DOTTED if date.count(".") == 2 else FORMATS
     if month:
         of_name = MONTHS[max((name for name in MONTHS if month[0].lower().startswith(name)), key=len)]
         date, formats = f"{date[: month.start()]}-{of_name}-{date[month.end() :]}", OF_NAMED_MONTH[month.start() == 0]
-    else:
-        formats = DOTTED if date.count(".") == 2 else FORMATS
     numbers, found = "-".join(re.findall(r"\d+", date)), {}
     for form in formats:
         with suppress(ValueError):
