@@ -21,7 +21,8 @@ from dzdesign.core.recorded_units import Quantity, Unit
 from dzdesign.identify.reading.binary_table import LONGEST_MARK, format_of, read_binary_table
 from dzdesign.identify.reading.channel_clocks import lay_on_one_clock, refuse_an_early_end
 from dzdesign.identify.reading.clock import ASSUMED_MS, clock_doubt, may_count_ms, never_back, read_times_of_day
-from dzdesign.identify.reading.column_labels import PRESSURES, QUANTITY_OF_COLUMN, Column, find_columns
+from dzdesign.identify.reading.column_labels import PRESSURES, QUANTITY_OF_COLUMN, Column
+from dzdesign.identify.reading.columns import find_columns
 from dzdesign.identify.reading.metering_edge import metering_edge, side_without_dp
 from dzdesign.identify.reading.missing_values import (
     Missing,
