@@ -9,10 +9,9 @@ import pytest
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.reading import thinning
+from dzdesign.identify.reading import ramp_test
 from dzdesign.identify.reading.ramp_files import ramp_file_bytes, read_ramp_file
-from dzdesign.identify.reading.ramp_test import RampTest
-from dzdesign.identify.reading.thinning import thin
+from dzdesign.identify.reading.ramp_test import RampTest, thin
 from tests.identify.reading.test_dirty_recordings import changed, jittered, spiked, staircase
 from tests.identify.reading.test_ramp_files import assert_is_the_ramp, table
 from tests.support.repeatable_valves import identify
@@ -69,7 +68,7 @@ WITHOUT_SPIKES["floor and spikes"] = CASES["floor behind the noise"]
 
 @pytest.mark.parametrize("name", CASES)
 def test_thinning_moves_no_knee(name, monkeypatch, wording):
-    monkeypatch.setattr(thinning, "MOST_ROWS", LIMIT)
+    monkeypatch.setattr(ramp_test, "MOST_ROWS", LIMIT)
     test = CASES[name]()
     options = IdentifyOptions(meter_lag=0.5 if "lag" in name else 0.0)
     # Spikes leave no trace, so what is to be found is what the same recording gives without them.
@@ -86,7 +85,7 @@ def test_thinning_moves_no_knee(name, monkeypatch, wording):
 
 
 def test_a_staircase_keeps_its_levels(monkeypatch):
-    monkeypatch.setattr(thinning, "MOST_ROWS", 2_000)
+    monkeypatch.setattr(ramp_test, "MOST_ROWS", 2_000)
     test = staircase(long_ramp())  # 60 rows a level
     left = thin(np.stack([test.time, test.u, test.q, test.dp]))
     u = left.rows[1]
@@ -96,7 +95,7 @@ def test_a_staircase_keeps_its_levels(monkeypatch):
 
 @pytest.mark.parametrize("noise", [0.0, 0.02])
 def test_no_flow_between_zero_and_the_floor_is_made_up(noise, monkeypatch):
-    monkeypatch.setattr(thinning, "MOST_ROWS", LIMIT)
+    monkeypatch.setattr(ramp_test, "MOST_ROWS", LIMIT)
     test = thinned(with_true_floor(long_ramp(noise=noise)))
     between = (test.q > 1e-3 * L_MIN) & (test.q < (1.2 - 1e-9) * L_MIN)
     assert not between.any() and (test.q == 0).any()
@@ -104,14 +103,14 @@ def test_no_flow_between_zero_and_the_floor_is_made_up(noise, monkeypatch):
 
 def test_means_of_all_rows_would_make_one_up(monkeypatch):
     """The check above, checked."""
-    monkeypatch.setattr(thinning, "MOST_ROWS", LIMIT)
+    monkeypatch.setattr(ramp_test, "MOST_ROWS", LIMIT)
     monkeypatch.setattr(np, "partition", lambda runs, *_, axis: np.repeat(runs.mean(axis, keepdims=True), 9, axis))
     test = thinned(with_true_floor(long_ramp(noise=0.02)))
     assert np.any((test.q > 1e-3 * L_MIN) & (test.q < (1.2 - 1e-9) * L_MIN))
 
 
 def test_a_sweep_faster_than_its_runs_is_not_smeared(monkeypatch):
-    monkeypatch.setattr(thinning, "MOST_ROWS", 500)
+    monkeypatch.setattr(ramp_test, "MOST_ROWS", 500)
     up = np.linspace(0, 10, 1000)
     u = np.tile(np.concatenate([up, up[::-1]]), 8)
     left = thin(np.stack([np.arange(u.size) / 100, u, u**3, np.full(u.size, 1e6)]))
@@ -129,11 +128,11 @@ def test_below_the_limit_nothing_is_touched(monkeypatch):
 
 
 def test_parts_that_are_thinned_one_after_the_other_make_no_difference(monkeypatch):
-    monkeypatch.setattr(thinning, "MOST_ROWS", LIMIT)
+    monkeypatch.setattr(ramp_test, "MOST_ROWS", LIMIT)
     test = CASES["floor and spikes"]()
     rows = np.stack([test.time, test.u, test.q, test.dp])[:, :-5]
     at_once = thin(rows)
-    monkeypatch.setattr(thinning, "PART", 77)
+    monkeypatch.setattr(ramp_test, "PART", 77)
     np.testing.assert_array_equal(thin(rows).rows, at_once.rows)
 
 

@@ -12,8 +12,7 @@ from typing import final
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.reading.clock import never_back, read_times_of_day
-from dzdesign.identify.reading.clock_columns import ClockColumns
+from dzdesign.identify.reading.clock import ClockColumns, never_back, read_times_of_day
 from dzdesign.identify.reading.column_labels import Column
 from dzdesign.identify.reading.missing_values import without_placeholders
 from dzdesign.identify.reading.scaling import scaling_of

@@ -205,6 +205,7 @@ def split_column(table: Table, label: str) -> tuple[str | None, str]:
 
 
 def quantity_named(name: str) -> str | None:
+    """Return the quantity of a ramp test that a name is of, in any spelling; None if it is of none."""
     return COLUMN_NAMES.get(re.sub(r"[\s_]", "", name[:LONGEST_NAME]).lower())
 
 

@@ -7,7 +7,7 @@ from difflib import get_close_matches
 
 from dzdesign.core.errors import InputError
 from dzdesign.core.units import measures
-from dzdesign.identify.reading.clock_columns import ClockColumns
+from dzdesign.identify.reading.clock import ClockColumns
 from dzdesign.identify.reading.column_labels import (
     COLUMN_NAMES,
     EXAMPLE_LABELS,
@@ -47,8 +47,6 @@ def find_columns(table: Table, chosen: Mapping[str, str], sample_rate: float | N
     """
     clocks = ClockColumns(table)
     columns = labelled_columns(table, chosen, clocks)
-    if "time" not in chosen and "time" in columns and columns["time"].unit and not fits(columns["time"].unit, "time"):
-        del columns["time"]  # T_degC is no time
     if sample_rate is not None:
         columns = _without_time(table, columns, clocks, sample_rate)
     edge = metering_edge(columns)
@@ -138,8 +136,8 @@ def labelled_columns(table: Table, chosen: Mapping[str, str], clocks: ClockColum
         unit = "s" if quantity == "time" and not fits(unit, "time") and table.is_clock(label) else unit
         if quantity in columns and not fits(unit, quantity):
             continue  # an oil temperature T_degC beside the time t_s, a set point Q_set beside Q_Lmin
-        if quantity in ("pP", "pT") and unit and not fits(unit, quantity):
-            continue  # a thermometer Pt_degC
+        if quantity in ("pP", "pT", "time") and unit and not fits(unit, quantity):
+            continue  # a thermometer Pt_degC or T_degC
         if quantity == "time" and "time" in columns and fits(columns["time"].unit, "time"):
             also_time = label
             continue

@@ -15,8 +15,7 @@ import numpy as np
 from dzdesign.core.artefact_files import open_bytes
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.units import measures
-from dzdesign.identify.reading.clock import is_milliseconds
-from dzdesign.identify.reading.clock_columns import ClockColumns
+from dzdesign.identify.reading.clock import ClockColumns, is_milliseconds
 from dzdesign.identify.reading.column_labels import (
     COLUMN_NAMES,
     EXAMPLE_UNITS,
@@ -140,8 +139,6 @@ def propose_columns(
         table = read_table(file, path, skip_rows)
         clocks = ClockColumns(table)
         known, times = labelled_columns(table, chosen, clocks), clocks.labels
-        if "time" in known and known["time"].unit and not fits(known["time"].unit, "time"):
-            del known["time"]  # T_degC is no time
         edge = metering_edge(known)
         known = {name: column for name, column in known.items() if not _is_unused(name, column, edge)}
         unclear = {name: why for name, column in known.items() if (why := _why_unreadable(path, name, column))}

@@ -1,6 +1,6 @@
 """Ramp files: a recorded table whose columns are a quantity and its unit; read into SI, or written.
 
-A long recording is thinned: see `thinning`.
+A long recording is thinned: see `thin`.
 """
 
 import gzip
@@ -30,11 +30,10 @@ from dzdesign.identify.reading.missing_values import (
     without_failed_signals,
     without_placeholders,
 )
-from dzdesign.identify.reading.ramp_test import RampTest, Switch
+from dzdesign.identify.reading.ramp_test import RampTest, Switch, thin
 from dzdesign.identify.reading.scaling import Scaling, scaling_of
 from dzdesign.identify.reading.table import AND, QUOTED_CHARACTERS, Table
 from dzdesign.identify.reading.text_file import read_text_table
-from dzdesign.identify.reading.thinning import thin
 from dzdesign.identify.reading.time_stamps import Start
 from dzdesign.identify.reading.units_of_columns import units_of_columns
 from dzdesign.identify.valve.recorded_drop import DropColumns
