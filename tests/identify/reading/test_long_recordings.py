@@ -7,7 +7,6 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from dzdesign.core.errors import InputError
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading import ramp_test
 from dzdesign.identify.reading.ramp_files import ramp_file_bytes, read_ramp_file
@@ -134,31 +133,6 @@ def test_parts_that_are_thinned_one_after_the_other_make_no_difference(monkeypat
     at_once = thin(rows)
     monkeypatch.setattr(ramp_test, "PART", 77)
     np.testing.assert_array_equal(thin(rows).rows, at_once.rows)
-
-
-@pytest.mark.parametrize(
-    "spoil",
-    [
-        lambda lines: [*lines[:25], "1,x,3,4", *lines[25:]],
-        lambda lines: [*lines[:25], "1,2,3", *lines[25:]],
-        lambda lines: [*lines[:25], "1,2,3", "# two", "1,2,3,4,5", *lines[25:]],
-        lambda lines: [*lines[:25], "0,1,2,3", *lines[25:]],
-        lambda lines: [*lines[:25], "1,1e9,2,3", *lines[25:]],
-        lambda lines: [*lines[:25], "9" * 500, *lines[25:]],
-    ],
-)
-@pytest.mark.parametrize("before", ["", "# one\r\n\r\n"])
-def test_a_fault_far_below_the_header_is_found_in_its_row(tmp_path, spoil, before, wording):
-    (tmp_path / "a.csv").write_bytes(before.encode() + "\n".join(spoil(table().splitlines())).encode())
-    with wording.refusal(InputError):
-        read_ramp_file(tmp_path / "a.csv")
-
-
-def test_a_short_row_is_not_made_up_for_by_a_long_one(tmp_path, wording):
-    rows = ["0,1,2,", "1,2"]  # as many separators as two rows should have
-    (tmp_path / "a.csv").write_text("\n".join(["time_s,u_V,Q_Lmin", *(["0,1,2"] * 30), *rows]))
-    with wording.refusal(InputError):
-        read_ramp_file(tmp_path / "a.csv")
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes")
