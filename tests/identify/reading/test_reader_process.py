@@ -18,9 +18,11 @@ DZDESIGN = Path(sys.executable).with_name("dzdesign.exe" if sys.platform == "win
 ASKING = """
 import os, signal, time
 signal.signal(getattr(signal, "SIGHUP", signal.SIGTERM), signal.SIG_DFL)
+from dzdesign.core.processes.workers import interrupts_kept_waiting
 from dzdesign.identify.reading.binary_table import _reader
 reader = _reader(os.getpid())
-answer = reader.submit(time.sleep, 60)
+with interrupts_kept_waiting():
+    answer = reader.submit(time.sleep, 60)
 print(*reader._processes, flush=True)
 answer.result()
 """
@@ -30,8 +32,9 @@ SOON_S = 5.0
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals are of POSIX")
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGKILL])
-def test_a_busy_reader_ends_with_the_process_that_asks_it(number):
-    asking = subprocess.Popen([sys.executable, "-c", ASKING], stdout=subprocess.PIPE, text=True)
+def test_a_busy_reader_ends_with_the_process_that_asks_it_and_nothing_is_said(tmp_path, number):
+    with open(tmp_path / "said", "wb") as said:
+        asking = subprocess.Popen([sys.executable, "-c", ASKING], stdout=subprocess.PIPE, stderr=said, text=True)
     reader = int(asking.stdout.readline())
     time.sleep(0.5)  # until it asks
     asking.send_signal(number)
@@ -43,6 +46,8 @@ def test_a_busy_reader_ends_with_the_process_that_asks_it(number):
     if there:
         os.kill(reader, signal.SIGKILL)
     assert not there
+    time.sleep(1)  # the helpers of joblib end after it
+    assert (tmp_path / "said").read_text() == ""
 
 
 @pytest.mark.parametrize("name", ["mat 5", "parquet"])

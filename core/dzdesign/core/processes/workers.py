@@ -47,21 +47,28 @@ def _wait_for_end(process: int) -> None:
 @contextmanager
 def safe_path() -> Iterator[None]:
     """Let processes that are started meanwhile import no module from the working folder: recordings lie there."""
-    before = os.environ.get(SAFE_PATH)
-    os.environ[SAFE_PATH] = "1"
+    with _environment(SAFE_PATH, "1"):
+        yield
+
+
+@contextmanager
+def _environment(name: str, value: str) -> Iterator[None]:
+    before = os.environ.get(name)
+    os.environ[name] = value
     try:
         yield
     finally:
-        os.environ.pop(SAFE_PATH)
+        os.environ.pop(name)
         if before is not None:
-            os.environ[SAFE_PATH] = before
+            os.environ[name] = before
 
 
 @contextmanager
 def interrupts_kept_waiting() -> Iterator[None]:
     """Let processes that are started meanwhile hear no Ctrl-C, which is for this one: as they start it is a traceback.
 
-    The helpers of joblib, which allow it again as they start, are started before.
+    The helpers of joblib, which allow it again as they start, are started before; they say nothing of what is left to
+    clean up where this process is killed.
     """
     if sys.platform == "win32":
         yield
@@ -70,8 +77,9 @@ def interrupts_kept_waiting() -> Iterator[None]:
 
     from joblib.externals.loky.backend import resource_tracker as loky_tracker
 
-    resource_tracker.ensure_running()
-    loky_tracker.ensure_running()
+    with _environment("PYTHONWARNINGS", "ignore"):
+        resource_tracker.ensure_running()
+        loky_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
