@@ -20,8 +20,8 @@ import os, signal, time
 signal.signal(getattr(signal, "SIGHUP", signal.SIGTERM), signal.SIG_DFL)
 from dzdesign.core.processes.workers import interrupts_kept_waiting
 from dzdesign.identify.reading.binary_table import _reader
-reader = _reader(os.getpid())
 with interrupts_kept_waiting():
+    reader = _reader(os.getpid())
     answer = reader.submit(time.sleep, 60)
 print(*reader._processes, flush=True)
 answer.result()
