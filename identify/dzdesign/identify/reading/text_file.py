@@ -576,7 +576,8 @@ def _samples(rows: bytes, number: int, header: Header, path: Path) -> tuple[byte
     """Return rows that all have as many cells as the header, what parts their cells, and the numbers of their lines.
 
     `number` is that of the first line. Comments, blank lines, the header when it stands there again, and what a logger
-    wrote below the samples are left out.
+    wrote above or below the samples are left out. Words amid samples are refused, and so are lines that begin as a
+    sample does and are none.
     """
     if not rows:
         return rows, header.separator, range(number, number)
@@ -585,28 +586,32 @@ def _samples(rows: bytes, number: int, header: Header, path: Path) -> tuple[byte
     kept = _look_like_samples(rows, starts[:-1], header)
     if kept.all():
         return rows, header.separator, range(number, number + kept.size)
-    footer, out = _Footer(path, header), io.BytesIO()
-    after = 0  # behind the last line that was looked at
+    others: list[tuple[int, list[str]]] = []
+    out, after = io.BytesIO(), 0  # behind the last line that was looked at
     for index in (*np.flatnonzero(~kept).tolist(), kept.size):
         if index > after:
-            footer.refuse_samples_below()
             plain = rows[starts[after] : starts[index] - 1]
             out.write(plain.replace(header.separator.encode(), CELL_END.encode()) + b"\n")
         after = index + 1
-        if index == kept.size:
+        if index == kept.size or len(others) > MOST_LINES:
             break
         line = rows[starts[index] : starts[after] - 1].decode()
         if not line.strip(' \t,;"') or COMMENT_LINE.match(line) or line in header.repeats:
             continue
         cells = _cells_or_refusal(line, header.separator, number + index, path)
         if len(cells) != len(header.labels) or _is_no_sample(cells):
-            footer.add(number + index, cells)
-            continue
-        footer.refuse_samples_below()
-        out.write(CELL_END.join(cells).encode() + b"\n")
-        kept[index] = True
+            others.append((index, cells))
+        else:
+            out.write(CELL_END.join(cells).encode() + b"\n")
+            kept[index] = True
+    samples = np.flatnonzero(kept)
+    first, last = (samples[0], samples[-1]) if samples.size else (kept.size, 0)
+    for index, cells in others:
+        if is_number(cells[0]) or first < index < last or len(others) > MOST_LINES:
+            raise _wrong_row(cells, number + index, header, path, above=index < first)
+        logger.debug("'%s' row %d is passed over: %s", path, number + index, " ".join(cells)[:QUOTED_CHARACTERS])
     out.truncate(max(out.tell() - 1, 0))
-    return out.getvalue(), CELL_END, number + np.flatnonzero(kept)
+    return out.getvalue(), CELL_END, number + samples
 
 
 def _look_like_samples(rows: bytes, starts: np.ndarray, header: Header) -> np.ndarray:
@@ -651,54 +656,27 @@ def _is_statistic(cell: str) -> bool:
     return STATISTIC.fullmatch(bare) is not None
 
 
-@final
-class _Footer:
-    """The lines of one file that are no samples: words and statistics, after which no sample follows."""
+def _wrong_row(cells: Sequence[str], number: int, header: Header, path: Path, *, above: bool) -> InputError:
+    """Return the error for a row that has too many or too few cells, or is a word of the logger amid samples.
 
-    def __init__(self, path: Path, header: Header) -> None:
-        self._path, self._header = path, header
-        self._begun = False  # whether there was a sample
-        self._error: InputError | None = None
-        self._count = 0
-
-    def add(self, number: int, cells: Sequence[str]) -> None:
-        """Take a line that is no sample; refuse one that begins as a sample does."""
-        error = self._wrong_row(cells, number)
-        if is_number(cells[0]):
-            raise error
-        logger.debug("'%s' row %d is passed over: %s", self._path, number, " ".join(cells)[:QUOTED_CHARACTERS])
-        self._error = self._error or error
-        self._count += 1
-        if self._count > MOST_LINES:
-            raise self._error
-
-    def refuse_samples_below(self) -> None:
-        """Refuse samples below such lines, unless they are the first: between header and samples some stand as well."""
-        if not self._begun:
-            self._begun, self._error, self._count = True, None, 0
-        if self._error is not None:
-            raise self._error
-
-    def _wrong_row(self, cells: Sequence[str], number: int) -> InputError:
-        """Return the error for a row that has too many or too few cells, or is a word of the logger amid samples."""
-        header, width, word = self._header, len(self._header.labels), cells[0][:QUOTED_CHARACTERS]
-        the_header = f"the header, row {header.line} ('{', '.join(header.labels)[:QUOTED_CHARACTERS]}')"
-        begin = f"'{self._path}' row {number} has"
-        if len(cells) != width:
-            comma = header.separator == "," and len(cells) == 2 * width
-            advice = [
-                "decimal commas need ';' or a tab between the cells" if comma else "",
-                "complete the row, or delete it, as a logger that was stopped may have left half of one"
-                if len(cells) < width and is_number(word) and self._begun
-                else "correct the row, or begin it with # if it is no sample",
-                "" if self._begun else "--skip-rows says how many rows stand above the header",
-            ]
-            found = f"{len(cells)} cell{'s' if len(cells) > 1 else f', {word!r}'}"
-            return InputError(
-                f"{begin} {found}, expected {width} as in {the_header}; {'; '.join(filter(None, advice))}"
-            )
-        kind = "a statistic" if _is_statistic(word) else "a word and no number"
-        return InputError(
-            f"{begin} {kind}, '{word}', and samples below it, expected nothing but samples below {the_header}; begin "
-            "the row with # if it is no sample, or delete it; --skip-rows says how many rows stand above the header"
-        )
+    `above`: it stands above all samples, so the header may be none.
+    """
+    width, word = len(header.labels), cells[0][:QUOTED_CHARACTERS]
+    the_header = f"the header, row {header.line} ('{', '.join(header.labels)[:QUOTED_CHARACTERS]}')"
+    begin = f"'{path}' row {number} has"
+    if len(cells) != width:
+        comma = header.separator == "," and len(cells) == 2 * width
+        advice = [
+            "decimal commas need ';' or a tab between the cells" if comma else "",
+            "complete the row, or delete it, as a logger that was stopped may have left half of one"
+            if len(cells) < width and is_number(word) and not above
+            else "correct the row, or begin it with # if it is no sample",
+            "--skip-rows says how many rows stand above the header" if above else "",
+        ]
+        found = f"{len(cells)} cell{'s' if len(cells) > 1 else f', {word!r}'}"
+        return InputError(f"{begin} {found}, expected {width} as in {the_header}; {'; '.join(filter(None, advice))}")
+    kind = "a statistic" if _is_statistic(word) else "a word and no number"
+    return InputError(
+        f"{begin} {kind}, '{word}', and samples below it, expected nothing but samples below {the_header}; begin "
+        "the row with # if it is no sample, or delete it; --skip-rows says how many rows stand above the header"
+    )
