@@ -167,6 +167,13 @@ def test_what_a_spreadsheet_writes_for_no_value_is_a_blank_cell_and_no_comment(h
     assert_is_the_ramp(read(text(labels, "# a comment", *spoiled)), np.arange(TIME.size) != 9)
 
 
+def test_a_header_that_begins_with_a_digit_may_stand_there_again(here):
+    lines = rows(TIME, U, DP, Q)
+    head = "1st Zeit [s];u_V;dP_MPa;Q_Lmin"
+    content = text(head, *lines[:500], head, *lines[500:])
+    assert_is_the_ramp(read(content, columns={"time": "1st Zeit [s]"}))
+
+
 def test_a_row_of_units_is_no_first_sample_and_may_say_what_labels_say(here):
     assert_is_the_ramp(read(text("t_s;u;dP_MPa;Q_Lmin", "sec;V;MPa;l/min", *rows(TIME, U, DP, Q))))
 

@@ -616,7 +616,8 @@ def _samples(rows: bytes, number: int, header: Header, path: Path) -> tuple[byte
 
 def _look_like_samples(rows: bytes, starts: np.ndarray, header: Header) -> np.ndarray:
     """Tell of each line whether it begins with a number, has as many cells as the header, and no quotes."""
-    if header.separator == BLANKS or len(header.labels) < 2:
+    likely = header.separator != BLANKS and len(header.labels) >= 2
+    if not likely or any(line.encode() in rows for line in header.repeats if line[:1].encode() in NUMERIC):
         return np.zeros(starts.size, dtype=bool)
     characters = np.frombuffer(rows, np.uint8)
     is_indent, is_numeric = np.zeros((2, 256), dtype=bool)
