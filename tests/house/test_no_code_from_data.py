@@ -19,13 +19,12 @@ STARTING = {f"subprocess.{name}" for name in ("Popen", "run", "call", "check_cal
 LOADING = ("ctypes", "cffi", "_ctypes", "numpy.ctypeslib", "np.ctypeslib")
 #: Where libraries are loaded: the system's own, and what is run as a process of its own.
 LOADS = {
-    "dzdesign/dzdesign/batch/parent_watch.py",
+    "core/dzdesign/core/processes/workers.py",
     "verify/dzdesign/verify/toolchain/library_server.py",
 }
 #: Where programs are started: by their full path, and with a time to end.
 STARTS = {
     "core/dzdesign/core/processes/running.py",
-    "identify/dzdesign/identify/reading/binary/reader_process.py",
     "verify/dzdesign/verify/toolchain/compiled_library.py",
 }
 

@@ -3,8 +3,6 @@
 import logging
 import os
 import pydoc
-import signal
-import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
@@ -15,9 +13,9 @@ from threading import Event, Thread
 from typing import TYPE_CHECKING, Any
 
 from dzdesign.batch.calibration import Outcome, Task, calibrate
-from dzdesign.batch.parent_watch import end_with
 from dzdesign.core.artefact_types import THIS_TOOL
 from dzdesign.core.errors import InputError, and_more
+from dzdesign.core.processes.workers import end_with, interrupts_kept_waiting, safe_path
 from dzdesign.report.lot.summary import FAILED
 from dzdesign.terminal.progress import say
 
@@ -35,8 +33,6 @@ MOST_NAMED = 10
 LOOK_S = 5.0
 #: Loggers of Dask that tell of a lost scheduler in pages of their own.
 TALKATIVE = ("distributed", "distributed.client")
-#: Python then looks for modules neither in the working folder nor beside a script.
-SAFE_PATH = "PYTHONSAFEPATH"
 ENDED = "the process that calibrated it ended without a word (out of memory, or killed)"
 
 
@@ -76,46 +72,11 @@ def _in_processes(tasks: Iterable[Task], jobs: int, work: Work) -> Iterator[Outc
     if jobs > 1:
         processes = {"backend": "loky", "inner_max_num_threads": 1}
         processes |= {"initializer": end_with, "initargs": (os.getpid(),)}
-    with _safe_path(), parallel_config(n_jobs=jobs, **processes):
+    with safe_path(), parallel_config(n_jobs=jobs, **processes):
         pool = Parallel(return_as="generator_unordered", pre_dispatch=AHEAD * jobs, batch_size=1)
-        with _interrupts_kept_waiting() if jobs > 1 else nullcontext():
+        with interrupts_kept_waiting() if jobs > 1 else nullcontext():
             outcomes = pool(delayed(work)(task) for task in tasks)
         yield from outcomes
-
-
-@contextmanager
-def _interrupts_kept_waiting() -> Iterator[None]:
-    """Let processes that are started meanwhile hear no Ctrl-C, which is for this one: as they start it is a traceback.
-
-    The helpers of joblib, which allow it again as they start, are started before.
-    """
-    if sys.platform == "win32":
-        yield
-        return
-    from multiprocessing import resource_tracker
-
-    from joblib.externals.loky.backend import resource_tracker as loky_tracker
-
-    resource_tracker.ensure_running()
-    loky_tracker.ensure_running()
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-@contextmanager
-def _safe_path() -> Iterator[None]:
-    """Let processes that are started meanwhile import no module from the working folder: recordings lie there."""
-    before = os.environ.get(SAFE_PATH)
-    os.environ[SAFE_PATH] = "1"
-    try:
-        yield
-    finally:
-        os.environ.pop(SAFE_PATH)
-        if before is not None:
-            os.environ[SAFE_PATH] = before
 
 
 def _alone(task: Task, work: Work) -> Outcome:

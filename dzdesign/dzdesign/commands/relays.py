@@ -155,7 +155,6 @@ RELAYS: Mapping[str, Relay] = {
         (
             "dzdesign verify firmware",
             "dzdesign verify plc -o plc_evidence",
-            
             'dzdesign verify calibrated/lot/firmware --blocks "calibrated/valves/*/calibration.bin"',
             "dzdesign verify firmware --machine-code",
         ),

@@ -190,9 +190,7 @@ def _pressure_table(
 
 def _full_command(tests: "Sequence[RampTest]") -> tuple[float, float]:
     """Return the full command to declare, and the largest one seen, both in V."""
-    from dzdesign.identify.ramps.command import despiked
-
-    seen = max(float(abs(despiked(test.u)).max()) for test in tests)
+    seen = max(float(abs(test.smooth).max()) for test in tests)
     return next((usual for usual in USUAL_U_MAX if seen <= 1.02 * usual), math.ceil(seen)), seen
 
 

@@ -190,7 +190,7 @@ TEXTS: dict[str, tuple[Callable[[], bytes], str | None]] = {
     "zip": (lambda: zipped("a.csv", CSV), "zip archive"),
     "zip behind gzip": (lambda: gzip.compress(zipped("a.csv", CSV), mtime=0), "zip archive"),
 }  # fmt: skip
-#: Of programs; what crashes or fills a library is refused in the words of `reader_process`.
+#: Of programs; what crashes or fills a library is refused in the words of `binary_table`.
 BINARIES: dict[str, tuple[Callable[[], bytes], str | None]] = {
     "HDF5 with links elsewhere": (lambda: with_hdf5(linked_elsewhere), "holds no columns"),
     "HDF5 with a loop": (lambda: with_hdf5(hard_loop), None),

@@ -189,27 +189,6 @@ def test_no_reading_is_made_up_over_a_pause(read):
 
 EVEN = {**LATE, "Q": clock(0.24, end=14.24)}
 NAMELESS = mat(EVEN).replace(b"t_u_s", b"t_x_s").replace(b"t_Q_s", b"t_y_s")
-REFUSED = {
-    "starts stated for some": (tdms(LATE, stated=("u", "dP")), "ramp.csv': 'Q' has a clock of its own, and from when"),
-    "no time in common": (mat({**LATE, "Q": clock() + 1e4}), "which begins 10000 s after that of 'u_V'"),
-    "other units": (mat(LATE).replace(b"t_Q_s", b"t_Q_h"), "so they have no time in common"),
-    "no units": (mat(LATE, "t_{}"), "has no unit"),
-    "times behind, equal labels": (
-        side_by_side(LATE, "Time (s)").replace(b"Time (s),u (V)", b"u (V),Time (s)", 1),
-        "which is that of 'u (V)' can't be told",
-    ),
-    "names that tell nothing": (NAMELESS, "has no column of time"),
-}
-
-
-@pytest.mark.parametrize("name", REFUSED)
-def test_what_nobody_can_tell_is_refused_by_name(read, name):
-    content, words = REFUSED[name]
-    with pytest.raises(InputError) as caught:
-        read(content)
-    assert words in str(caught.value) and "sample-rate" not in str(caught.value)
-
-
 def test_the_time_of_one_channel_is_not_taken_for_another_s(read):
     with pytest.raises(InputError, match="and which is that of 'Q_Lmin' can't be told"):
         read(NAMELESS, columns={"time": "t_x_s"})

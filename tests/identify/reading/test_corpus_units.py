@@ -12,7 +12,7 @@ from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.knees import meter_floor
 from dzdesign.identify.ramps import splitting
 from dzdesign.identify.ramps.staircases import find_staircase
-from dzdesign.identify.reading import column_labels, ramp_files, units_of_columns
+from dzdesign.identify.reading import columns, ramp_files, units_of_columns
 from dzdesign.identify.reading.metering_edge import MeteringEdge, metering_edge
 
 CASES = {case.name: case for case in corpus_units.cases()}
@@ -31,7 +31,7 @@ def test_working_ports_in_silence_are_seen(name, tmp_path, monkeypatch):
         working = {"pA", "pB"}
         return metering_edge(working if working <= set(quantities) else quantities)
 
-    for module in (column_labels, ramp_files):
+    for module in (columns, ramp_files):
         monkeypatch.setattr(module, "metering_edge", in_silence)
     assert corpus_units.fault_of(CASES[name], tmp_path)
 

@@ -148,18 +148,6 @@ def test_a_time_that_is_missing_is_a_missing_sample(read):
     assert read(content).time.size == TIME.size - 1
 
 
-@pytest.mark.parametrize(
-    ("dates", "words"),
-    [
-        (["01/02/2026"] * 300 + ["02/02/2026"] * (TIME.size - 300), "it is 1 or 31 days, as it can't be told"),
-        (["22.11.2026"] * 300 + ["soon"] * (TIME.size - 300), "row 302, column 'Datum [+] Uhrzeit': 'soon 00:00:02"),
-    ],
-)
-def test_dates_that_can_not_be_told_are_refused(read, dates, words):
-    with pytest.raises(InputError, match=words):
-        read(two_columns(dates=dates))
-
-
 @pytest.mark.parametrize("dates", [["45989"] * TIME.size, ["22. Nov 2026"] * TIME.size, ["1.2.3"] * TIME.size])
 def test_what_is_no_date_leaves_the_time_of_day(proposed, read, dates):
     content = two_columns(dates=dates)
@@ -211,45 +199,6 @@ def test_a_time_as_programs_spell_it(read, name):
     if name in ("MATLAB", "German", "French", "English", "year first"):
         assert test.stamp == start_of("2026-12-31 23:59:50.123")
     assert (test.stamp is None) == name.startswith(("IEC t", "IEC du", "sec", "pandas"))
-
-
-@pytest.mark.parametrize(
-    "spelled",
-    [
-        [f"Tue Feb  3 08:00:{second:06.3f} 2026" for second in TIME % 60],
-        [f"2026年2月3日 8時{second:.3f}" for second in TIME],
-        [f"3/2/2026 8.00.{second:06.3f}" for second in TIME % 60],
-    ],
-)
-def test_what_only_looks_like_a_date_is_named_so(read, spelled, wording):
-    with wording.refusal(InputError):
-        read(one_column(spelled), {"time": "time"})
-
-
-@pytest.mark.parametrize(("hours", "form"), [(1, "25.10.2026 %H:%M:%S,"), (1, "%H:%M:%S,"), (12, "%I:%M:%S,")])
-def test_a_clock_that_is_set_back_is_named(read, hours, form, wording):
-    start = datetime.datetime(2026, 10, 25, 12 if hours == 12 else 2, 59, 50)
-    spelled = stamps(form, start)
-    if hours == 1:
-        spelled = [each.replace("03:00:", "02:00:") for each in spelled]
-    with wording.refusal(InputError):
-        read(one_column(spelled), {})
-
-
-@pytest.mark.parametrize("cell", ["05. Mrz", "1. Jan", "Mrz 05", "5-Mar", "Mar-05", "3 mai"])
-def test_dates_that_a_spreadsheet_made_are_named(read, cell):
-    lines = text("time_s;u [V];dP [MPa];Q [l/min]", *rows(TIME, U, DP, Q)).split(b"\n")
-    lines[9] = lines[9].rpartition(b";")[0] + b";" + cell.encode()
-    with pytest.raises(InputError, match=f"'{cell}' is a date, which a spreadsheet makes of numbers"):
-        read(b"\n".join(lines), {})
-
-
-@pytest.mark.parametrize("cell", ["0.0 mV", "12,5 l/min", "3 %", "1.5e-3V"])
-def test_a_unit_in_a_cell_is_named(read, cell):
-    lines = text("time_s;u [V];dP [MPa];Q [l/min]", *rows(TIME, U, DP, Q)).split(b"\n")
-    lines[9] = lines[9].rpartition(b";")[0] + b";" + cell.encode()
-    with pytest.raises(InputError, match=r"row 10, column 'Q .*has its unit in the cell"):
-        read(b"\n".join(lines), {})
 
 
 def test_recordings_that_overlap_are_seen(read):

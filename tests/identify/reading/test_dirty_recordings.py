@@ -5,11 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from dzdesign.core.errors import InputError
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.ramps.command import despiked, lagged_command
+from dzdesign.identify.ramps.command import lagged_command
 from dzdesign.identify.reading.ramp_files import ramp_file_bytes, read_ramp_file
-from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.reading.ramp_test import RampTest, despiked
 from tests.support.repeatable_valves import identify
 from tests.support.synthetic import L_MIN, Truth, synthetic_ramp
 
@@ -191,12 +190,6 @@ def test_blank_cells_and_a_clock_that_jitters_back(written):
     assert np.all(np.diff(read.time) >= 0) and read.u.size < test.u.size
     (found,) = identify([read], IdentifyOptions(meter_lag=0.001)).positive.tests
     assert (found.u_knee_rising_V, found.u_knee_falling_V) == pytest.approx(KNEES, abs=0.012)
-
-
-def test_a_clock_that_was_set_back_is_refused(written, wording):
-    test = clean()
-    with wording.refusal(InputError):
-        read_ramp_file(written(changed(test, time=np.where(np.arange(test.u.size) < 3000, test.time, test.time - 5))))
 
 
 def test_despiking_keeps_steps_and_turning_points():

@@ -262,36 +262,3 @@ def test_a_matlab_table_is_named_with_what_to_do(read):
         with pytest.raises(InputError, match=r"save a MATLAB table T by s = table2struct\(T, 'ToScalar', true\)"):
             read(content)
     assert_is_the_ramp(read(with_a_table(COLUMNS)))  # what it lacks nothing for is read as before
-
-
-@pytest.mark.parametrize(
-    ("content", "words"),
-    [
-        (mat({"note": "none"}), "holds no columns of numbers; expected one vector per quantity, such as u_V"),
-        (mat({**COLUMNS, "Q_Lmin": Q[:-1]}), "column 'Q_Lmin' has 29 samples, but 'time_s' has 30; expected one clock"),
-        (frame("write_parquet", {**COLUMNS, "Q_Lmin": Q * 1e9}), "sample 16, column 'Q_Lmin'"),
-        (frame("write_parquet", {**COLUMNS, "dP_MPa": DP * np.inf}), "0 complete rows, expected at least 20"),
-        (frame("write_parquet", {"t": TIME, "u_V": U, "Q_Lmin": Q}), "column 't' has no unit"),
-        (tdms({**PLAIN, "u": (U, "bar")}), "column 'u': 'bar' is not a unit of voltage"),
-        (mat({"a": {"u_V": U, "time_s": TIME, "Q_Lmin": Q}, "b": {"u_V": U}}), "no column of u (columns found: a/u_V"),
-        (hdf5({**COLUMNS, "u [V]": U}), "has two columns of u: 'u [V]' and 'u_V'"),
-        (b"PAR1 this is none", "is not a Parquet file that can be read"),
-        (b"ARROW1 this is none", "is not a Feather file that can be read"),
-        (b"TDSm this is none", "(TDMS) holds no columns of numbers"),
-        (b"MATLAB 5.0 MAT-file, this is none", "is not a MATLAB file that can be read"),
-        (b"MATLAB 7.3 MAT-file, this is none", "is not a MATLAB 7.3 file that can be read"),
-        (b"\x89HDF\r\n\x1a\n this is none", "is not a HDF5 file that can be read"),
-        (b"time_s,u_V\n", "is not a MATLAB file that can be read"),
-    ],
-)
-def test_refused_with_the_reason(read, content, words):
-    with pytest.raises(InputError) as caught:
-        read(content)
-    assert words in str(caught.value) and "ramp.mat'" in str(caught.value) and "\n" not in str(caught.value)
-
-
-def test_text_in_a_chosen_column_is_refused(read, wording):
-    content = frame("write_parquet", {**COLUMNS, "note": ["ok"] * ROWS})
-    with wording.refusal(InputError):
-        read(content, columns={"u": "note:V"})
-    assert_is_the_ramp(read(content))

@@ -1,7 +1,5 @@
-"""Recordings of many rows: thinned without moving a knee; text in pieces is what it is at once."""
+"""Recordings of many rows: thinned without moving a knee; a fault far down is found in its row."""
 
-import dataclasses
-import gzip
 import os
 import threading
 import tracemalloc
@@ -9,13 +7,10 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from dzdesign.core.errors import InputError
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.reading import thinning
+from dzdesign.identify.reading import ramp_test
 from dzdesign.identify.reading.ramp_files import ramp_file_bytes, read_ramp_file
-from dzdesign.identify.reading.ramp_test import RampTest
-from dzdesign.identify.reading.text import table_reader
-from dzdesign.identify.reading.thinning import thin
+from dzdesign.identify.reading.ramp_test import RampTest, thin
 from tests.identify.reading.test_dirty_recordings import changed, jittered, spiked, staircase
 from tests.identify.reading.test_ramp_files import assert_is_the_ramp, table
 from tests.support.repeatable_valves import identify
@@ -72,7 +67,7 @@ WITHOUT_SPIKES["floor and spikes"] = CASES["floor behind the noise"]
 
 @pytest.mark.parametrize("name", CASES)
 def test_thinning_moves_no_knee(name, monkeypatch, wording):
-    monkeypatch.setattr(thinning, "MOST_ROWS", LIMIT)
+    monkeypatch.setattr(ramp_test, "MOST_ROWS", LIMIT)
     test = CASES[name]()
     options = IdentifyOptions(meter_lag=0.5 if "lag" in name else 0.0)
     # Spikes leave no trace, so what is to be found is what the same recording gives without them.
@@ -89,7 +84,7 @@ def test_thinning_moves_no_knee(name, monkeypatch, wording):
 
 
 def test_a_staircase_keeps_its_levels(monkeypatch):
-    monkeypatch.setattr(thinning, "MOST_ROWS", 2_000)
+    monkeypatch.setattr(ramp_test, "MOST_ROWS", 2_000)
     test = staircase(long_ramp())  # 60 rows a level
     left = thin(np.stack([test.time, test.u, test.q, test.dp]))
     u = left.rows[1]
@@ -99,7 +94,7 @@ def test_a_staircase_keeps_its_levels(monkeypatch):
 
 @pytest.mark.parametrize("noise", [0.0, 0.02])
 def test_no_flow_between_zero_and_the_floor_is_made_up(noise, monkeypatch):
-    monkeypatch.setattr(thinning, "MOST_ROWS", LIMIT)
+    monkeypatch.setattr(ramp_test, "MOST_ROWS", LIMIT)
     test = thinned(with_true_floor(long_ramp(noise=noise)))
     between = (test.q > 1e-3 * L_MIN) & (test.q < (1.2 - 1e-9) * L_MIN)
     assert not between.any() and (test.q == 0).any()
@@ -107,14 +102,14 @@ def test_no_flow_between_zero_and_the_floor_is_made_up(noise, monkeypatch):
 
 def test_means_of_all_rows_would_make_one_up(monkeypatch):
     """The check above, checked."""
-    monkeypatch.setattr(thinning, "MOST_ROWS", LIMIT)
+    monkeypatch.setattr(ramp_test, "MOST_ROWS", LIMIT)
     monkeypatch.setattr(np, "partition", lambda runs, *_, axis: np.repeat(runs.mean(axis, keepdims=True), 9, axis))
     test = thinned(with_true_floor(long_ramp(noise=0.02)))
     assert np.any((test.q > 1e-3 * L_MIN) & (test.q < (1.2 - 1e-9) * L_MIN))
 
 
 def test_a_sweep_faster_than_its_runs_is_not_smeared(monkeypatch):
-    monkeypatch.setattr(thinning, "MOST_ROWS", 500)
+    monkeypatch.setattr(ramp_test, "MOST_ROWS", 500)
     up = np.linspace(0, 10, 1000)
     u = np.tile(np.concatenate([up, up[::-1]]), 8)
     left = thin(np.stack([np.arange(u.size) / 100, u, u**3, np.full(u.size, 1e6)]))
@@ -132,67 +127,12 @@ def test_below_the_limit_nothing_is_touched(monkeypatch):
 
 
 def test_parts_that_are_thinned_one_after_the_other_make_no_difference(monkeypatch):
-    monkeypatch.setattr(thinning, "MOST_ROWS", LIMIT)
+    monkeypatch.setattr(ramp_test, "MOST_ROWS", LIMIT)
     test = CASES["floor and spikes"]()
     rows = np.stack([test.time, test.u, test.q, test.dp])[:, :-5]
     at_once = thin(rows)
-    monkeypatch.setattr(thinning, "PART", 77)
+    monkeypatch.setattr(ramp_test, "PART", 77)
     np.testing.assert_array_equal(thin(rows).rows, at_once.rows)
-
-
-def assert_same(one: RampTest, other: RampTest) -> None:
-    for field in dataclasses.fields(RampTest):
-        np.testing.assert_array_equal(getattr(one, field.name), getattr(other, field.name))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
-@pytest.mark.parametrize(
-    "spoil",
-    [
-        lambda text: text,
-        lambda text: "# oil at 40 °C\n\n" + text + "# the end",
-        lambda text: text.replace("\n", ",\n").replace("\n0.12,", "\n,", 1).replace(",1,", ",nan,", 1),
-        lambda text: text.replace(",", ";").replace(".", ","),
-        lambda text: text.replace(",", "  "),
-        lambda text: "\ufeff" + text,
-    ],
-)
-def test_text_read_in_pieces_is_text_read_at_once(tmp_path, monkeypatch, spoil, end):
-    content = spoil(table()).replace("\n", end).encode()
-    for name, data in (("a.csv", content), ("a.csv.gz", gzip.compress(content))):
-        (tmp_path / name).write_bytes(data)
-        at_once = read_ramp_file(tmp_path / name)
-        for size in (64, 65, 66, 67, 301):
-            with monkeypatch.context() as context:
-                context.setattr(table_reader, "PIECE_BYTES", size)
-                assert_same(read_ramp_file(tmp_path / name), at_once)
-
-
-@pytest.mark.parametrize(
-    "spoil",
-    [
-        lambda lines: [*lines[:25], "1,x,3,4", *lines[25:]],
-        lambda lines: [*lines[:25], "1,2,3", *lines[25:]],
-        lambda lines: [*lines[:25], "1,2,3", "# two", "1,2,3,4,5", *lines[25:]],
-        lambda lines: [*lines[:25], "0,1,2,3", *lines[25:]],
-        lambda lines: [*lines[:25], "1,1e9,2,3", *lines[25:]],
-        lambda lines: [*lines[:25], "9" * 500, *lines[25:]],
-    ],
-)
-@pytest.mark.parametrize("before", ["", "# one\r\n\r\n"])
-def test_a_fault_in_a_later_piece_is_found_in_its_row(tmp_path, monkeypatch, spoil, before, wording):
-    monkeypatch.setattr(table_reader, "PIECE_BYTES", 128)
-    (tmp_path / "a.csv").write_bytes(before.encode() + "\n".join(spoil(table().splitlines())).encode())
-    with wording.refusal(InputError):
-        read_ramp_file(tmp_path / "a.csv")
-
-
-def test_a_short_row_is_not_made_up_for_by_a_long_one(tmp_path, wording):
-    rows = ["0,1,2,", "1,2"]  # as many separators as two rows should have
-    (tmp_path / "a.csv").write_text("\n".join(["time_s,u_V,Q_Lmin", *(["0,1,2"] * 30), *rows]))
-    with wording.refusal(InputError):
-        read_ramp_file(tmp_path / "a.csv")
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes")
@@ -204,9 +144,8 @@ def test_a_pipe_is_read_once(tmp_path):
     writer.join()
 
 
-def test_memory_is_a_few_times_the_file(tmp_path, monkeypatch):
+def test_memory_is_a_few_times_the_file(tmp_path):
     """Of what Python and NumPy take; `benchmarks/identify/reading.py` measures the whole process."""
-    monkeypatch.setattr(table_reader, "PIECE_BYTES", 1 << 16)
     test = long_ramp()
     columns = {"time_s": test.time, "u_V": test.u, "Q_Lmin": test.q / L_MIN, "dP_MPa": test.dp / 1e6}
     content = ramp_file_bytes(columns, (), compress=False)

@@ -225,79 +225,14 @@ def spoiled(row, column, cell, before=""):
     return before + "\n".join(lines)
 
 
-@pytest.mark.parametrize("cell", ["soon", "1.2.3", "1e", "0x10", "1_0"])
-def test_text_in_a_number_is_found_in_its_row_of_the_file(refusal, cell, wording):
-    # Three lines before the header, which is line 4; four rows on: row 8.
-    wording.of_test(refusal(spoiled(4, 1, cell, before="# one\n\n# two\n")))
-
-
 @pytest.mark.parametrize("separator", ["\x0b", "\x0c", "\x1c", "\x85", "\u2028"])
 def test_rows_are_counted_as_an_editor_does(refusal, separator):
     assert "row 6," in refusal(spoiled(4, 1, "x", before=f"# a{separator}b\n"))
 
 
-@pytest.mark.parametrize("cell", ["1e20", "-1e10"])
-def test_numbers_that_no_valve_gives(refusal, cell, wording):
-    wording.of_test(refusal(spoiled(4, 2, cell)))
-
-
 def test_long_cells_and_many_columns_are_cut(refusal):
     assert len(refusal(spoiled(4, 1, "x" * 10000))) < 400
     assert len(refusal(",".join(f"channel {n}" for n in range(1000)) + "\n")) < 500
-
-
-@pytest.mark.parametrize(
-    ("content", "words"),
-    [
-        (b"", "is empty; expected a header row"),
-        (b"\n# only this\n\n", "is empty; expected a header row"),
-        (table().partition("\n")[2], "has no header row (row 1 is '0,0,1,0')"),
-        (HEADER + "\n", "has 0 complete rows, expected at least 20"),
-        (table("time,u,dP,Q"), "column 'time' has no unit; write for example time_s"),
-        (table("time_s,u_V,dP,Q_Lmin"), "column 'dP' has no unit; write for example dP_MPa"),
-        (table("time_s,u_V,dP_MPa,Q"), "column 'Q' has no unit; write for example Q_Lmin"),
-        (table("time_s,u_V,dP_mpa,Q_Lmin"), "column 'dP_mpa': 'mpa' is not a unit of pressure"),
-        (table("time_s,u_V,dP [barr],Q_Lmin"), "(did you mean 'bar'?)"),
-        (table("time_s,u_V,dP [Lmin],Q_Lmin"), "column 'dP [Lmin]': 'Lmin' is not a unit of pressure"),
-        (table("time_s,u [mA],dP_MPa,Q_Lmin"), "column 'u [mA]': 'mA' is not a unit of voltage"),
-        (table("time_s,u [9**9**9**9],dP_MPa,Q_Lmin"), "'9**9**9**9' is not a unit of voltage"),
-        (table("time_s,comand_V,dP_MPa,Q_Lmin"), "no column of u (columns found: time_s, comand_V,"),
-        (table("time_s,comand_V,dP_MPa,Q_Lmin"), "(did you mean 'comand_V'? name it u_V)"),
-        (table("time_s,voltage_V,dP_MPa,Q_Lmin"), "(did you mean 'voltage_V'? name it u_V)"),
-        (table("tme_s,u_V,dP_MPa,Q_Lmin"), "no column of time"),
-        (table("time_s,u_V,dP_MPa,through_Lmin"), "(did you mean 'through_Lmin'? name it Q_Lmin)"),
-        (table("time_s,u_V,u [V],Q_Lmin"), "row 1 has two columns of u: 'u_V' and 'u [V]'"),
-        (table("time_s,u_V,pA_MPa,Q_Lmin"), "row 1 has a column of pA but none of pB; expected both, or that"),
-        (table("time_s,u_V,pB_MPa,Q_Lmin"), "row 1 has a column of pB but none of pA; expected both, or that"),
-        (table() + "1,2,3\n", f"row {ROWS + 2} has 3 cells, expected 4 as in the header"),
-        ("#\n" + table() + "1,2,3,4,5\n", f"row {ROWS + 3} has 5 cells, expected 4 as in the header"),
-        (HEADER + "\n0,1,2,3,4,5,6,7\n", "decimal commas need ';' or a tab"),
-        (spoiled(7, 0, "0.1"), "row 8: the time goes back"),
-        (gzip.compress(table().encode(), mtime=0)[:-20], "is not a whole gzip file"),
-        (gzip.compress(table().encode(), mtime=0)[:15] + b"\0" * 40, "is not a whole gzip file"),
-        (b"\x1f\x8b", "is not a whole gzip file"),
-        (table().encode("utf-16")[:-1], "begins as UTF-16 and is not (truncated data)"),
-        (table().encode("utf-16-le"), "is UTF-16 without a byte order mark, or no text at all"),
-        (b"# \x81l\n" + table().encode(), "neither in UTF-8 nor in Windows-1252 (byte 3)"),
-        (b"\xef\xbb\xbf# \xd6l\n" + table().encode(), "is not a text file in UTF-8 throughout (byte 6)"),
-        (zipped("[Content_Types].xml"), "is an Excel workbook (xlsx); in the spreadsheet program"),
-        (zipped("mimetype", "application/vnd.oasis.opendocument.spreadsheet"), "is a workbook (ods); in the spreads"),
-        (zipped("u_V.npy"), "is a NumPy archive (npz); save its arrays"),
-        (zipped("ramp.csv"), "is a zip archive; unpack it"),
-        (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "is an Excel workbook (xls); in the spreadsheet program"),
-        (b"MDF     4.10    TGT 15.0", "is an MDF recording (mf4, mdf); save it as MATLAB or CSV"),
-        (b"UnFinMF 4.10    TGT 15.0", "is an MDF recording (mf4, mdf); save it as MATLAB or CSV"),
-        (b"LOGG\x90\0\0\0\x01", "is a BLF log of a CAN bus; export"),
-        (b"|CF,2,1,1;|CK,1,3,1,1;", "is an imc recording; export"),
-        (b"SQLite format 3\0\x10", "is an SQLite database; export"),
-        (b"\x93NUMPY\x01\0v\0", "is a NumPy array (npy); save it by"),
-        (b"7z\xbc\xaf\x27\x1c\0\x04", "is a packed archive; unpack it"),
-    ],
-)  # fmt: skip
-def test_refused_with_the_reason_and_the_place(refusal, content, words):
-    message = refusal(content)
-    assert words in message
-    assert "ramp.csv'" in message and "\n" not in message
 
 
 @pytest.mark.parametrize(

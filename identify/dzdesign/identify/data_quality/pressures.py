@@ -11,7 +11,6 @@ import numpy as np
 from dzdesign.core.worded import Worded, all_of, worded
 from dzdesign.identify.constants import FULL_SWEEP, L_MIN, MPA
 from dzdesign.identify.data_quality.catalogue import Finding, warn
-from dzdesign.identify.ramps.command import despiked
 from dzdesign.identify.ramps.pooling import SAME_PRESSURE
 from dzdesign.identify.ramps.splitting import SHUT
 from dzdesign.identify.reading.named_pressure import claimed_pressures, contradicts
@@ -105,7 +104,7 @@ def _stands_still(every: np.ndarray, low: float, middle: float, high: float) -> 
 
 def _flows_at_one_command(tests: Sequence[RampTest]) -> tuple[float, list[float]]:
     """Return the largest command that all recordings reach, V, and each one's flow there; zero where that is small."""
-    top = min(float(despiked(test.u).max()) for test in tests)
+    top = min(test.top for test in tests)
     flows = []
     for test in tests:
         away = np.abs(test.u - top)
@@ -156,7 +155,7 @@ def _scatters(test: RampTest) -> bool:
 
 def about_mixtures(tests: Sequence[RampTest]) -> Iterator[Finding]:
     """Yield a warning for each pressure drop at which recordings, taken as one test, differ grossly in their flow."""
-    tops = [float(despiked(test.u).max()) for test in tests]
+    tops = [test.top for test in tests]
     whole = [test for test, top in zip(tests, tops, strict=True) if top >= FULL_SWEEP * max(tops)]
     for dp, group in _at_one_pressure(whole):
         top, flows = _flows_at_one_command(group)

@@ -8,8 +8,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.core.worded import Worded, worded
 from dzdesign.identify.constants import MPA
 from dzdesign.identify.knees.described_tests import DescribedTest
-from dzdesign.identify.ramps.command import despiked
-from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.reading.ramp_test import RampTest, despiked
 
 #: The pressure drop has settled where it lies within this share of its level, for this share of the recording.
 SETTLED, LAST = 0.05, 0.05

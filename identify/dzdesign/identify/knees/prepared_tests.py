@@ -30,7 +30,6 @@ from dzdesign.identify.knees.refusals import (
     refuse_two_signs_of_flow,
 )
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.ramps.command import despiked
 from dzdesign.identify.ramps.pooling import PooledTest, name_of_ramp, pool_ramps
 from dzdesign.identify.ramps.splitting import Ramp, dp_under_flow, nominal_dp, split_ramps
 from dzdesign.identify.ramps.sweep_pressure import NO_PRESSURE
@@ -97,7 +96,7 @@ def split_recordings(tests: Sequence[RampTest], options: IdentifyOptions, lag: f
     The flow meter's lag is in s.
     """
     ramps, split = list[Ramp](), list[list[Ramp]]()
-    tops = [float(despiked(test.u).max()) for test in tests]
+    tops = [test.top for test in tests]
     for test, top in zip(tests, tops, strict=True):
         if top > 1.05 * options.u_max:
             above = "'{source}': the command reaches {top:.2f V}, above u_max = {u_max:g V}; give --u-max"

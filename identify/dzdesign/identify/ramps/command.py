@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.reading.ramp_test import RampTest, despiked
 
 #: A change of direction is real when the command has gone back by this share of its range.
 TURN = 0.1
@@ -16,7 +16,7 @@ SPIKE, SPIKE_STEPS = 0.02, 10
 
 def without_command_spikes(test: RampTest) -> RampTest:
     """Leave out samples whose command stands alone: their flow belongs to another command."""
-    smooth = despiked(test.u)
+    smooth = test.smooth
     usual = float(np.median(np.abs(np.diff(test.u))))
     kept = np.abs(test.u - smooth) <= max(SPIKE * np.ptp(smooth), SPIKE_STEPS * usual)
     return test if kept.all() else test.part(kept)
@@ -43,15 +43,6 @@ def _spread(time: np.ndarray) -> np.ndarray:
     gaps = np.minimum(np.where(np.isnan(gaps), usual, gaps), usual)
     rank = np.arange(time.size) - np.repeat(first, count)
     return time + rank * np.repeat(gaps / count, count)
-
-
-def despiked(u: np.ndarray) -> np.ndarray:
-    """Return the running median of three: a single sample that stands out is gone, a step stays where it was."""
-    if u.size < 3:
-        return u
-    left, middle, right = u[:-2], u[1:-1], u[2:]
-    inner = np.maximum(np.minimum(left, middle), np.minimum(np.maximum(left, middle), right))
-    return np.concatenate([u[:1], inner, u[-1:]])
 
 
 def sweep_direction(u: np.ndarray) -> np.ndarray:

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from dzdesign.identify.ramps.command import despiked
 from dzdesign.identify.reading.metering_edge import OF_EITHER_SIGN
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.recorded_drop import DropSign
@@ -20,7 +19,7 @@ def tests_of_side(tests: Sequence[RampTest], sign: int, u_max: float) -> list[Ra
     """Return the recordings that show one side (1: positive commands, -1: negative ones), mirrored to positive."""
     found = []
     for test in tests:
-        smooth = despiked(test.u)
+        smooth = test.smooth
         both = [smooth.size > 0 and (side * smooth).max() >= SMALLEST_SWEEP * u_max for side in (1, -1)]
         # What shows neither side is refused with the positive one.
         if both[0 if sign > 0 else 1] or (sign > 0 and not any(both)):

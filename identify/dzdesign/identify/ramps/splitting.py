@@ -21,7 +21,6 @@ from dzdesign.identify.ramps.branches import Branch
 from dzdesign.identify.ramps.command import (
     SMALLEST_MOVE,
     TURN,
-    despiked,
     lagged_command,
     sweep_direction,
     without_command_spikes,
@@ -41,7 +40,7 @@ from dzdesign.identify.ramps.sweep_pressure import (
     swings_about,
     why_no_ramp,
 )
-from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.reading.ramp_test import RampTest, despiked
 from dzdesign.identify.valve.left_out import LeftOut
 
 #: The valve is shut, and the pressure drop nominal, below this share of the range.
@@ -163,7 +162,7 @@ def _in_order_of_levels(test: RampTest) -> RampTest:
 def _why_no_ramp(sweeps: Sequence[_Sweep]) -> list[Reason | None]:
     """Tell of each sweep why it is none of a ramp test; a jump goes with a ramp."""
     slow = [sweep for sweep in sweeps if sweep.is_branch]
-    found = iter(why_no_ramp([sweep.level for sweep in slow], [float(despiked(sweep.test.u).max()) for sweep in slow]))
+    found = iter(why_no_ramp([sweep.level for sweep in slow], [sweep.test.top for sweep in slow]))
     return [next(found) if sweep.is_branch else None for sweep in sweeps]
 
 
@@ -241,7 +240,7 @@ def _off_level(group: Sequence[_Sweep], test: RampTest) -> np.ndarray:
     """Return which samples of a ramp were not run at its pressure drop (N,)."""
     sure = [sweep.level for sweep in group if sweep.level.sure]
     found = []
-    lowest = min(float(despiked(sweep.test.u).min()) for sweep in group) + SHUT * float(np.ptp(test.u))
+    lowest = min(float(sweep.test.smooth.min()) for sweep in group) + SHUT * float(np.ptp(test.u))
     for sweep in group:
         level = sweep.level
         if not level.sure and sure:

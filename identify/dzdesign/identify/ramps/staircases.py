@@ -18,7 +18,7 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.constants import BIN_WIDTH
-from dzdesign.identify.ramps.command import despiked
+from dzdesign.identify.reading.ramp_test import despiked
 
 #: A step of the command stands out of its noise by so many standard deviations, and of its range by this share.
 STEP_SIGMAS, SMALLEST_STEP = 6.0, 2.5e-3

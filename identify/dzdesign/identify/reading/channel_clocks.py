@@ -12,14 +12,8 @@ from typing import final
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.reading.clock import never_back, read_times_of_day
-from dzdesign.identify.reading.column_labels import (
-    Column,
-    are_alike,
-    clock_of,
-    counts_time,
-    time_columns,
-)
+from dzdesign.identify.reading.clock import ClockColumns, never_back, read_times_of_day
+from dzdesign.identify.reading.column_labels import Column
 from dzdesign.identify.reading.missing_values import without_placeholders
 from dzdesign.identify.reading.scaling import scaling_of
 from dzdesign.identify.reading.table import AND, Table
@@ -94,9 +88,10 @@ def lay_on_one_clock(
         return
     time = found["time"]
     reference = _clock(table, time, u_max, data["time"])
-    _refuse_an_unclear_one(table, found, reference, u_max)
+    clocks = ClockColumns(table)
+    _refuse_an_unclear_one(table, clocks, found, reference, u_max)
     if not time_is_chosen:
-        _refuse_another_time(table, found, reference, u_max)
+        _refuse_another_time(table, clocks, found, reference, u_max)
     others = {column.clock.label: _clock(table, column.clock, u_max) for column in found.values() if column.clock}
     differ = False
     for quantity, column in found.items():
@@ -170,16 +165,18 @@ def _laid(
     return laid
 
 
-def _refuse_an_unclear_one(table: Table, found: Mapping[str, Column], reference: Clock, u_max: float) -> None:
+def _refuse_an_unclear_one(
+    table: Table, clocks: ClockColumns, found: Mapping[str, Column], reference: Clock, u_max: float
+) -> None:
     """Refuse a channel without a time of its own beside a time that no channel claims and that differs."""
     time = found["time"]
-    alone = [each.label for name, each in found.items() if name != "time" and not clock_of(table, name, each.label)]
+    alone = [each.label for name, each in found.items() if name != "time" and not clocks.of(name, each.label)]
     if table.clocks or not alone or time.label not in table.labels:
         return
-    claimed = {clock_of(table, "", label) for label in table.labels}
+    claimed = {clocks.of("", label) for label in table.labels}
     claimed |= {column.clock.label for column in found.values() if column.clock}
-    for label in time_columns(table):
-        if label == time.label or label in claimed or not are_alike(table, time.label, label):
+    for label in clocks.labels:
+        if label == time.label or label in claimed or not clocks.are_alike(time.label, label):
             continue
         other = _clock(table, Column(label=label, unit=time.unit), u_max)
         if not other.is_the_same(reference):
@@ -191,17 +188,19 @@ def _refuse_an_unclear_one(table: Table, found: Mapping[str, Column], reference:
             )
 
 
-def _refuse_another_time(table: Table, found: Mapping[str, Column], reference: Clock, u_max: float) -> None:
+def _refuse_another_time(
+    table: Table, clocks: ClockColumns, found: Mapping[str, Column], reference: Clock, u_max: float
+) -> None:
     """Refuse a second time that no channel claims and that differs: which channels were sampled by it is not known.
 
     It rises from row to row, and has times in common. One from another zero, such as an uptime, tells nothing.
     """
-    time, claimed = found["time"], {clock_of(table, "-", label) for label in table.labels}
+    time, claimed = found["time"], {clocks.of("-", label) for label in table.labels}
     claimed |= {each.clock.label for each in found.values() if each.clock} | set(time.label.split(AND))
     alone = [each.label for name, each in found.items() if name not in ("time", "u") and not each.clock]
     for label in table.labels if alone and not table.clocks else ():
         beside = label not in claimed and table.length(label) == reference.seconds.size
-        column = counts_time(table, label) if beside else None
+        column = clocks.counted(label) if beside else None
         if column is None or table.is_clock(label) != table.is_clock(time.label):
             continue
         try:

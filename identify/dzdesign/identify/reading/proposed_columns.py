@@ -15,26 +15,22 @@ import numpy as np
 from dzdesign.core.artefact_files import open_bytes
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.units import measures
-from dzdesign.identify.reading.clock import is_milliseconds
+from dzdesign.identify.reading.clock import ClockColumns, is_milliseconds
 from dzdesign.identify.reading.column_labels import (
     COLUMN_NAMES,
     EXAMPLE_UNITS,
-    LESS,
     PRESSURES,
     QUANTITY_OF_COLUMN,
     Column,
-    clock_of,
-    column_of_time,
     fits,
-    labelled_columns,
     long_format,
     names_a_quantity,
     no_flow,
     same_unit,
     split_column,
     split_label,
-    time_columns,
 )
+from dzdesign.identify.reading.columns import LESS, labelled_columns
 from dzdesign.identify.reading.metering_edge import PORTS, MeteringEdge, metering_edge, which_edge
 from dzdesign.identify.reading.ramp_files import read_table
 from dzdesign.identify.reading.scaling import range_example, scaling_of
@@ -141,9 +137,8 @@ def propose_columns(
     """
     with open_bytes(path, "ramp file") as file:
         table = read_table(file, path, skip_rows)
-        known, times = labelled_columns(table, chosen), time_columns(table)
-        if "time" in known and known["time"].unit and not fits(known["time"].unit, "time"):
-            del known["time"]  # T_degC is no time
+        clocks = ClockColumns(table)
+        known, times = labelled_columns(table, chosen, clocks), clocks.labels
         edge = metering_edge(known)
         known = {name: column for name, column in known.items() if not _is_unused(name, column, edge)}
         unclear = {name: why for name, column in known.items() if (why := _why_unreadable(path, name, column))}
@@ -167,8 +162,8 @@ def propose_columns(
             elif why := _why_none(table, quantity, candidates):
                 unclear[quantity] = why
         u = (known | proposed).get("u")
-        if "time" in unclear and u is not None and (clock := clock_of(table, "u", u.label)):
-            proposed["time"] = column_of_time(table, clock)
+        if "time" in unclear and u is not None and (clock := clocks.of("u", u.label)):
+            proposed["time"] = clocks.column(clock)
             del unclear["time"]
         elif "time" in unclear and u is None and len(times) > 1:
             unclear["time"] += "; that of the command is taken as soon as u is known"

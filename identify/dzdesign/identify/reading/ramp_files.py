@@ -1,6 +1,6 @@
 """Ramp files: a recorded table whose columns are a quantity and its unit; read into SI, or written.
 
-A long recording is thinned: see `thinning`.
+A long recording is thinned: see `thin`.
 """
 
 import gzip
@@ -17,11 +17,11 @@ import numpy as np
 from dzdesign.core.artefact_files import open_bytes, sha256_of_file
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import Quantity, Unit
-from dzdesign.identify.reading.binary.array_table import read_binary_table
-from dzdesign.identify.reading.binary.registry import LONGEST_MARK, format_of
+from dzdesign.identify.reading.binary_table import LONGEST_MARK, format_of, read_binary_table
 from dzdesign.identify.reading.channel_clocks import lay_on_one_clock, refuse_an_early_end
 from dzdesign.identify.reading.clock import ASSUMED_MS, clock_doubt, may_count_ms, never_back, read_times_of_day
-from dzdesign.identify.reading.column_labels import PRESSURES, QUANTITY_OF_COLUMN, Column, find_columns
+from dzdesign.identify.reading.column_labels import PRESSURES, QUANTITY_OF_COLUMN, Column
+from dzdesign.identify.reading.columns import find_columns
 from dzdesign.identify.reading.metering_edge import metering_edge, side_without_dp
 from dzdesign.identify.reading.missing_values import (
     Missing,
@@ -29,11 +29,10 @@ from dzdesign.identify.reading.missing_values import (
     without_failed_signals,
     without_placeholders,
 )
-from dzdesign.identify.reading.ramp_test import RampTest, Switch
+from dzdesign.identify.reading.ramp_test import RampTest, Switch, thin
 from dzdesign.identify.reading.scaling import Scaling, scaling_of
 from dzdesign.identify.reading.table import AND, QUOTED_CHARACTERS, Table
-from dzdesign.identify.reading.text.table_reader import read_text_table
-from dzdesign.identify.reading.thinning import thin
+from dzdesign.identify.reading.text_file import read_text_table
 from dzdesign.identify.reading.time_stamps import Start
 from dzdesign.identify.reading.units_of_columns import units_of_columns
 from dzdesign.identify.valve.recorded_drop import DropColumns

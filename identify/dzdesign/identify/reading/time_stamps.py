@@ -8,6 +8,7 @@ nothing. Which part of a date is the day and which the month matters only where 
 
 import datetime
 import re
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -56,6 +57,11 @@ DURATION = (
 UNCLEAR = re.compile(r"\d{1,3}:[0-5]?\d(?:[.,]\d+)?|\d{1,4}[-./]\d{1,2}[-./]\d{1,4}(?:[T ]\d{1,2}:\d\d)?")
 #: A date with its year first or last.
 DATE = re.compile(r"'?(?:\d{4}[-./]\d{1,2}[-./]\d{1,2}|\d{1,2}[-./]\d{1,2}[-./](?:\d{4}|\d{2}))")
+#: Orders of day, month and year, behind each other: of a date with points, with other marks, and with the month's name,
+#: that in the midst or first.
+DOTTED = ("%Y-%m-%d", "%d-%m-%Y", "%d-%m-%y", "%y-%m-%d")
+FORMATS = (*DOTTED, "%m-%d-%Y", "%m-%d-%y")
+OF_NAMED_MONTH = (("%Y-%m-%d", "%d-%m-%Y", "%d-%m-%y"), ("%m-%d-%Y",))
 #: What may be a date or a time, in whatever form; what a spreadsheet makes of a number such as 5.3: 05. Mrz, Mar-05.
 LIKE_A_DATE = re.compile(rf"\d[-/.:]\d+[-/.:]\d|\d\W{{0,3}}{MONTH}|{MONTH}\W{{0,3}}\d|\d\s?[年月日時]")
 DATE_OF_A_NUMBER = re.compile(rf"\d{{1,2}}\W{{1,2}}{MONTH}|{MONTH}\W{{1,2}}\d{{1,2}}")
@@ -214,12 +220,12 @@ def _over_midnight(seconds: np.ndarray) -> np.ndarray:
 
 def _days_since_the_first(dates: list[str], where: str) -> dict[str, float]:
     """Return the seconds from the first date of the file to the midnight of each."""
-    first = dates[0]
-    if not _days(first):
+    first, began = dates[0], _days(dates[0])
+    if not began:
         raise InputError(f"{where}: '{first}' is no date; write dates as 2026-11-22, or the time in seconds")
     seconds = {first: 0.0}
     for text in dates[1:]:
-        both = sorted({other - one for one, other in _alike(first, text)})
+        both = sorted({day - began[form] for form, day in _days(text).items() if form in began})
         both = [days for days in both if abs(days) <= LONGEST_RECORDING] or both
         if len(both) != 1:
             count = " or ".join(map(str, both)) or "an unknown number of"
@@ -231,36 +237,17 @@ def _days_since_the_first(dates: list[str], where: str) -> dict[str, float]:
     return seconds
 
 
-def _alike(one: str, other: str) -> list[tuple[int, int]]:
-    """Return two dates as days, in each order of their parts that both can have."""
-    first, second = _days(one), _days(other)
-    return [(first[order], second[order]) for order in first if order in second]
-
-
 def _days(date: str) -> dict[str, int]:
-    """Return order of day, month and year -> days, for each order that a date can be read in."""
-    numbers = [int(part) for part in re.findall(r"\d+", date)]
+    """Return format -> days, for each format that a date can be read in."""
     month = re.search(MONTH, date)
+    formats: tuple[str, ...] = DOTTED if date.count(".") == 2 else FORMATS
     if month:
         of_name = MONTHS[max((name for name in MONTHS if month[0].lower().startswith(name)), key=len)]
-        numbers.insert(0 if month.start() == 0 else 1, of_name)
-        orders: tuple[str, ...] = ("mdy",) if month.start() == 0 else ("ymd",) if numbers[0] > 31 else ("dmy",)
-    elif len(date.split(".")) == 3 and numbers[0] <= 31:
-        orders = ("dmy",) if numbers[2] > 31 else ("dmy", "ymd")
-    elif numbers[0] > 31:
-        orders = ("ymd",)
-    elif numbers[2] > 31:
-        orders = ("dmy", "mdy")
-    else:
-        orders = ("dmy", "mdy", "ymd")
-    found = {}
-    for order in orders:
-        part = dict(zip(order, numbers, strict=True))
-        year = part["y"] + (2000 if part["y"] < 100 else 0)
-        try:
-            found[order] = datetime.date(year, part["m"], part["d"]).toordinal()
-        except ValueError:
-            continue
+        date, formats = f"{date[: month.start()]}-{of_name}-{date[month.end() :]}", OF_NAMED_MONTH[month.start() == 0]
+    numbers, found = "-".join(re.findall(r"\d+", date)), {}
+    for form in formats:
+        with suppress(ValueError):
+            found[form] = datetime.datetime.strptime(numbers, form).toordinal()
     return found
 
 

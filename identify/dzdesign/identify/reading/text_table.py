@@ -1,10 +1,14 @@
-"""A table of text: its columns as numbers, as times, and as they stand in the file."""
+"""A table of text: its columns as numbers, as times, and as they stand in the file.
+
+A cell such as ``2.001`` or ``2,001`` may be a decimal or a number with a mark between its thousands. It is read as a
+decimal, unless other cells of the file show the other mark as the decimal one, or stand beside it without a mark and
+are far larger: then it is refused, for nothing tells which it is, but where the same column shows it (``2.000,5``).
+"""
 
 import re
 from collections.abc import Collection, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import partial
 from typing import TYPE_CHECKING, final
 
 import numpy as np
@@ -12,8 +16,6 @@ import numpy as np
 from dzdesign.core.errors import InputError
 from dzdesign.identify.reading.missing_values import NO_VALUE, without_markers
 from dzdesign.identify.reading.table import AND, QUOTED_CHARACTERS, Table
-from dzdesign.identify.reading.text.cells import is_number
-from dzdesign.identify.reading.text.decimal_marks import BETWEEN_THOUSANDS, FEW_ROWS, DecimalMarks
 from dzdesign.identify.reading.time_stamps import (
     DATE_OF_A_NUMBER,
     EXAMPLE,
@@ -37,7 +39,29 @@ DATE = re.compile(r"\d[-/.:]\d+[-/.:]\d")
 #: A number with its unit.
 WITH_UNIT = re.compile(r"[-+]?[\d.,]*\d(?:[eE][-+]?\d+)?\s?((?![eE]$)[^\W\d_][^\s\d]{0,9}|%)")
 #: A cell whose column most likely holds nothing but numbers.
-NUMBER = re.compile(r"\s*[-+]?[\d.]+([eE][-+]?\d+)?")
+PLAIN_NUMBER = re.compile(r"\s*[-+]?[\d.]+([eE][-+]?\d+)?")
+#: What stands between thousands and is no decimal mark anywhere: a blank, a narrow or hard one, an apostrophe.
+BETWEEN_THOUSANDS = " \u00a0\u202f'\u2019"
+#: A number with any decimal mark, or with blanks or the like between thousands.
+NUMBER = re.compile(
+    rf"[-+\u2212]?\s?(?:\d{{1,3}}(?:[{BETWEEN_THOUSANDS}]\d{{3}})+(?:[.,]\d*)?|[\d.,]*\d[.,]?(?:[eE][-+]?\d+)?)|nan",
+    re.IGNORECASE,
+)
+#: By decimal mark: numbers with the other mark between thousands.
+GROUPED = {
+    ",": r"^[-+]?(?:\d{1,3}(?:\.\d{3})+|\d+)(?:,\d*)?$",
+    ".": r"^[-+]?(?:\d{1,3}(?:,\d{3})+|\d+)(?:\.\d*)?$",
+}
+#: Numbers with one mark, and those of them whose mark may be one between thousands; 0.123 can't.
+WITH_MARK = {".": r"^[-+]?\d*\.\d*(?:[eE][-+]?\d+)?$", ",": r"^[-+]?\d*,\d*(?:[eE][-+]?\d+)?$"}
+DOUBTFUL = {".": r"^[-+]?[1-9]\d{0,2}(?:\.\d{3})+$", ",": r"^[-+]?[1-9]\d{0,2}(?:,\d{3})+$"}
+OTHER = {".": ",", ",": "."}
+NAMES = {".": "points", ",": "commas"}
+#: Rows at the beginning of a file that mostly tell.
+FEW_ROWS = 200
+#: A whole number without a mark that is at least so large, and by so much larger than one with it, tells thousands.
+LEAST_WHOLE, FAR_LARGER = 100.0, 20.0
+ADVICE = "export numbers with one mark and no separator of thousands"
 
 
 @final
@@ -55,8 +79,6 @@ class TextTable(Table):
         Number of the header's line.
     lines : range or (N,) array of int
         Numbers of the rows' lines.
-    marks : DecimalMarks
-        Of the file.
     computed : mapping
         Label of a column of time -> its seconds, (N,), which the file states by start and step; such columns may follow
         those of the file.
@@ -72,12 +94,15 @@ class TextTable(Table):
     separator: str
     header_line: int
     lines: range | np.ndarray
-    marks: DecimalMarks
     computed: Mapping[str, np.ndarray] = field(default_factory=dict)
     starts: Mapping[str, str] = field(default_factory=dict)
     width: int = 0
     missing: Collection[str] = ()
     _loaded: "dict[str, pl.Series]" = field(default_factory=dict)
+    #: What columns that were read have shown: label -> decimal mark, a cell that shows it; and label -> mark that may
+    #: be one between thousands, a cell with it, where that stands.
+    _certain: dict[str, tuple[str, str]] = field(default_factory=dict)
+    _doubtful: dict[str, tuple[str, str, str]] = field(default_factory=dict)
 
     @property
     def header(self) -> str:
@@ -109,7 +134,7 @@ class TextTable(Table):
             if len(self.lines)
             and label in self.labels
             and label not in self.computed
-            and NUMBER.fullmatch(cells[self.labels.index(label)])
+            and PLAIN_NUMBER.fullmatch(cells[self.labels.index(label)])
         ]
         if likely:
             with suppress(pl.exceptions.PolarsError):  # a cell is not a number
@@ -126,14 +151,15 @@ class TextTable(Table):
         if label in self._loaded:
             loaded = self._loaded.pop(label)  # a second copy of a long recording would double the memory
             read = np.asarray(loaded.fill_null(np.nan).to_numpy())
-            self.marks.check_points(label, read, partial(self._texts, label), self.place)
+            if not self._shows_points(label, read):
+                self._with_points(label, self._texts(label))  # may refuse it
             return read
         texts, self.marked[label] = without_markers(self._texts(label), self.missing)
         # Before anything is said of its decimal mark: 05. Mrz, 5.0 mV.
         strange = (texts.str.contains(r"[\p{L}--[eE]]") & ~texts.str.contains("(?i)^[-+]?nan$")).fill_null(False)
         if len(row := strange.arg_true().head(1)):
             raise self._no_number(label, int(row[0]), texts[int(row[0])])
-        column = self.marks.with_points(label, texts, self.place)
+        column = self._with_points(label, texts)
         numbers = column.cast(pl.Float64, strict=False)
         filled = ~(column.is_null() | (column == ""))
         if (filled & numbers.is_null()).any():
@@ -258,6 +284,82 @@ class TextTable(Table):
             )
         return {label: frame[f"c{self.labels.index(label)}"] for label in types}
 
+    def _shows_points(self, label: str, numbers: np.ndarray) -> bool:
+        """Tell whether a column that was read with decimal points has one that stands between no thousands."""
+        for some in (numbers[:FEW_ROWS], numbers):
+            parts = np.abs(some[np.isfinite(some) & (some != np.rint(some))])
+            # In a decimal below 1, from 1000 on or with four digits behind it.
+            plain = parts[(parts < 1) | (parts >= 1000) | (np.abs(1e3 * parts - np.rint(1e3 * parts)) > 1e-6)]
+            if plain.size:
+                self._take_mark(label, ".", f"{plain[0]:g}")
+                return True
+        return False
+
+    def _with_points(self, label: str, texts: "pl.Series") -> "pl.Series":
+        """Return numbers with a decimal point, whatever their decimal mark is, and without one between thousands.
+
+        Raises
+        ------
+        InputError
+            If which mark is the decimal one can't be told.
+        """
+        point, comma = (texts.str.contains(mark, literal=True).fill_null(False) for mark in ".,")
+        if point.any() and comma.any():
+            both = texts.filter(comma & point)
+            cell = both[0] if len(both) else texts.filter(comma)[0]
+            decimal = max(",.", key=cell.rfind)
+            wrong = (~texts.str.contains(GROUPED[decimal]).fill_null(True) & (texts != "")).arg_true()
+            if not len(both) or len(wrong):
+                row = int(wrong[0]) if len(wrong) else int(point.arg_true()[0])
+                why = f"stands in one column with '{cell[:QUOTED_CHARACTERS]}', so which mark is the decimal one can't"
+                raise self._doubt(label, self.place(row), texts[row], f"{why} be told")
+            self._take_mark(label, decimal, cell)
+            return texts.str.replace_all(OTHER[decimal], "", literal=True).str.replace(decimal, ".", literal=True)
+        mark = "," if comma.any() else "."
+        for some in (texts.head(FEW_ROWS), texts):
+            marked = some.str.contains(WITH_MARK[mark]).fill_null(False)
+            plain = (marked & ~some.str.contains(DOUBTFUL[mark]).fill_null(False)).arg_true()
+            if len(plain):
+                self._take_mark(label, mark, some[int(plain[0])])
+                break
+        else:
+            # Several points or commas in a number are no decimal ones: left to whoever reads it to refuse.
+            if marked.any():
+                row = int(marked.arg_true()[0])
+                self._doubtful[label] = mark, texts[row], self.place(row)
+                self._refuse_a_contradiction()
+                self._refuse_whole_numbers_beside(label, texts, marked, mark)
+        return texts.str.replace(",", ".", literal=True) if mark == "," else texts
+
+    def _take_mark(self, label: str, mark: str, cell: str) -> None:
+        self._certain[label] = mark, cell
+        self._refuse_a_contradiction()
+
+    def _refuse_a_contradiction(self) -> None:
+        """Refuse a column whose mark may be one of thousands where another cell shows the other as the decimal one."""
+        for label, (mark, cell, place) in self._doubtful.items():
+            for other, (decimal, example) in self._certain.items():
+                if decimal != mark:
+                    of_other = f"decimal {NAMES[decimal]} ('{example[:QUOTED_CHARACTERS]}')"
+                    why = f"or a decimal, as column '{other[:QUOTED_CHARACTERS]}' has {of_other}"
+                    raise self._doubt(label, place, cell, f"may be {_without_marks(cell)} {why}")
+
+    def _refuse_whole_numbers_beside(self, label: str, texts: "pl.Series", marked: "pl.Series", mark: str) -> None:
+        """Refuse a column in which 998 and 1.001 stand: nothing measured goes from one to the other."""
+        import polars as pl
+
+        numbers = texts.str.replace(mark, ".", literal=True).cast(pl.Float64, strict=False).abs()
+        row = int(numbers.set(~marked, None).arg_min() or 0)
+        whole = numbers.set(marked | ~texts.str.contains(r"^[-+]?\d+$").fill_null(False), None).arg_max()
+        if whole is None or numbers[whole] < max(LEAST_WHOLE, FAR_LARGER * numbers[row]):
+            return
+        beside = f"stands in one column with '{texts[whole][:QUOTED_CHARACTERS]}'"
+        why = f"{beside}, so it may be {_without_marks(texts[row])} or a decimal"
+        raise self._doubt(label, self.place(row), texts[row], why)
+
+    def _doubt(self, label: str, place: str, cell: str, why: str) -> InputError:
+        return InputError(f"'{self.path}' {place}, column '{label}': '{cell[:QUOTED_CHARACTERS]}' {why}; {ADVICE}")
+
     def _no_number(self, label: str, row: int, cell: str) -> InputError:
         what = "is not a number"
         advice = "correct it; if it stands for no value, leave the cell blank, or name it by --missing"
@@ -272,6 +374,15 @@ class TextTable(Table):
             what += f" (a column of the time may hold stamps such as {EXAMPLE})"
         place = f"'{self.path}' {self.place(row)}, column '{label}'"
         return InputError(f"{place}: '{cell[:QUOTED_CHARACTERS]}' {what}; {advice}")
+
+
+def is_number(cell: str) -> bool:
+    """Tell whether a cell is a number, with any decimal mark, a date or a time of day."""
+    return NUMBER.fullmatch(cell) is not None or is_stamp(cell) or is_unclear(cell)
+
+
+def _without_marks(cell: str) -> str:
+    return re.sub("[.,]", "", cell)[:QUOTED_CHARACTERS]
 
 
 def _cells(texts: "pl.Series") -> "pl.Series":

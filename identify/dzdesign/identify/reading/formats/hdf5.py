@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.reading.binary.file_format import (
+from dzdesign.identify.reading.formats.file_format import (
     NUMBER_KINDS,
     FileColumn,
     FileFormat,

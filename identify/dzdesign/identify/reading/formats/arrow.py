@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 
-from dzdesign.identify.reading.binary.file_format import FileColumn, FileFormat, stamp_of
+from dzdesign.identify.reading.formats.file_format import FileColumn, FileFormat, stamp_of
 
 if TYPE_CHECKING:
     import polars as pl

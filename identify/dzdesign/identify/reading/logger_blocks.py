@@ -14,10 +14,11 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.reading.table import QUOTED_CHARACTERS, clean_label
-from dzdesign.identify.reading.text.header_search import COMMENT
-from dzdesign.identify.reading.text.text_table import TextTable
+from dzdesign.identify.reading.text_table import TextTable
 from dzdesign.identify.reading.time_stamps import start_of
 
+#: The column that LabVIEW announces, and leaves out of rows that have no comment.
+COMMENT = "comment"
 LABVIEW, END_OF_HEADER, X_VALUE = b"LabVIEW Measurement", "***End_of_Header***", "X_Value"
 #: First cells of a line that stands above a segment's header.
 WORD = re.compile(r"[^\W\d]|\*\*\*")

@@ -8,7 +8,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.reading.binary.file_format import FileColumn, FileFormat, stamp_of, unit_among
+from dzdesign.identify.reading.formats.file_format import FileColumn, FileFormat, stamp_of, unit_among
 
 
 def _columns(file: BinaryIO, path: Path, stack: ExitStack) -> Iterator[FileColumn]:

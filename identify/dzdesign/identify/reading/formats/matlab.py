@@ -8,7 +8,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from dzdesign.identify.reading.binary.file_format import (
+from dzdesign.identify.reading.formats.file_format import (
     MOST_COLUMNS,
     NO_NUMBERS_UNIT,
     NUMBER_KINDS,

@@ -1,1 +1,0 @@
-"""Text tables: bytes of a delimited file enter, its columns leave: encoding, header, cells, decimal mark, footer."""
