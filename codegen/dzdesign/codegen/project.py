@@ -22,7 +22,7 @@ from dzdesign.codegen.calibration.layout import BuiltFor, CalibrationBlock
 from dzdesign.codegen.calibration.packing import OCTETS, pack
 from dzdesign.codegen.core.certificate_text import zero_command
 from dzdesign.codegen.core.constants import FAULT_BITS, Values
-from dzdesign.codegen.loading.protocol import LOAD_FILES, STORE, load_texts
+from dzdesign.codegen.loading.protocol import LOAD_FILES, STORE, load_context
 from dzdesign.codegen.target import Target, folder_of
 from dzdesign.codegen.vectors import vectors_text
 from dzdesign.codegen.wiring import wiring_of
@@ -230,7 +230,11 @@ def _load_files(target: Target, banner: Banner) -> dict[str, str]:
         template = f"{name}.jinja"
         return board_lines(template) if f"{target.folder}/{name}" in board else banner.of_any_valve(template)
 
-    return {f"{target.folder}/{name}": text for name, text in load_texts(target.tick_Hz, lines).items()}
+    values = load_context(target.tick_Hz)
+    return {
+        f"{target.folder}/{name}": _render(f"{PACKAGE}.loading", f"{name}.jinja", lines(name), values)
+        for name in LOAD_FILES
+    }
 
 
 def link_names(target: Target, ending: str) -> tuple[str, ...]:

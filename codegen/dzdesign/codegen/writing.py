@@ -73,8 +73,8 @@ def _refuse_another(folder: Path, made: Firmware | Output) -> None:
         found = [f"it is for {quoted(target)}", *found]
     if found:
         raise InputError(
-            f"'{folder}' holds another {WORDS[family]}: {and_more(found, MOST_NAMED)}; give `codegen` --replace to "
-            "write over it, or choose a new folder with -o"
+            f"'{folder}' holds another {WORDS[family]}: {and_more(found, MOST_NAMED)}; `codegen --replace` writes over "
+            "it; or choose a new folder with -o"
         )
 
 

@@ -8,13 +8,12 @@ Each request is answered by a reply with the same sequence number; the PC sends 
 """
 
 import struct
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Annotated, Self
 
 from dzdesign.codegen.telemetry.frame import CRC_OCTETS, FrameSearch, Number, crc_of, numbers_of, struct_of
-from dzdesign.core.strict_templates import strict_templates
 
 SOURCES = ("dz_load.c", "dz_load_frame.c", "dz_slots.c")
 HEADERS = ("dz_load.h", "dz_load_frame.h", "dz_slots.h")
@@ -177,18 +176,8 @@ class FrameReader(FrameSearch):
             yield Frame(type=frame[2], sequence=frame[3], payload=frame[HEADER_OCTETS:-CRC_OCTETS])
 
 
-def load_texts(tick_Hz: int, banner: Callable[[str], Sequence[str]]) -> dict[str, str]:
-    """Return the C by which a drive takes a block, text of each file by name, for a tick of so many a second.
-
-    `banner` gives a file's first lines.
-    """
-    templates = strict_templates("dzdesign.codegen.loading", "dzdesign.codegen", autoescape=False)
-    values = _context(tick_Hz)
-    return {name: templates.get_template(f"{name}.jinja").render(banner=banner(name), **values) for name in LOAD_FILES}
-
-
-def _context(tick_Hz: int) -> dict[str, object]:
-    """Return what the C prints of the protocol."""
+def load_context(tick_Hz: int) -> dict[str, object]:
+    """Return what the C by which a drive takes a block prints of the protocol, for a tick of so many a second."""
     return {
         "sync_high": f"0x{SYNC >> 8:02X}",
         "sync_low": f"0x{SYNC & 0xFF:02X}",
