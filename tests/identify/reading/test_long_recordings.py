@@ -1,7 +1,5 @@
 """Recordings of many rows: thinned without moving a knee; a fault far down is found in its row."""
 
-import os
-import threading
 import tracemalloc
 
 import numpy as np
@@ -12,7 +10,6 @@ from dzdesign.identify.reading import ramp_test
 from dzdesign.identify.reading.ramp_files import ramp_file_bytes, read_ramp_file
 from dzdesign.identify.reading.ramp_test import RampTest, thin
 from tests.identify.reading.test_dirty_recordings import changed, jittered, spiked, staircase
-from tests.identify.reading.test_ramp_files import assert_is_the_ramp, table
 from tests.support.repeatable_valves import identify
 from tests.support.synthetic import L_MIN, Truth, synthetic_ramp
 
@@ -133,15 +130,6 @@ def test_parts_that_are_thinned_one_after_the_other_make_no_difference(monkeypat
     at_once = thin(rows)
     monkeypatch.setattr(ramp_test, "PART", 77)
     np.testing.assert_array_equal(thin(rows).rows, at_once.rows)
-
-
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes")
-def test_a_pipe_is_read_once(tmp_path):
-    os.mkfifo(tmp_path / "pipe")
-    writer = threading.Thread(target=(tmp_path / "pipe").write_bytes, args=(table().encode(),))
-    writer.start()
-    assert_is_the_ramp(read_ramp_file(tmp_path / "pipe"))
-    writer.join()
 
 
 def test_memory_is_a_few_times_the_file(tmp_path):
