@@ -9,7 +9,7 @@ import pytest
 from dzdesign.codegen.project import generate, target_named
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.artefact_reading import read_artefact
-from dzdesign.core.artefact_types import RuleError, to_json_bytes
+from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design

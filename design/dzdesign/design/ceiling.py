@@ -78,7 +78,7 @@ def offset_above(curve: CertifiedCurve, choice: Above, machine: Machine | None) 
         error_MPa = Fraction(repr(machine.bench_pressure_error_MPa)) if machine else NONE
         bound = _drawn_together(continued.bound(), error_MPa)
         return OffsetAbove.under(bound, last_V, certified=continued.certified)
-    held = BoundPiece(last_MPa, last_MPa + FURTHEST_MPa, last_V, last_V, NONE)
+    held = BoundPiece(last_MPa, last_MPa + FURTHEST_MPa, last_V, last_V)
     return OffsetAbove.under(CertifiedBound(pieces=(held,)), last_V, certified=False)
 
 
@@ -98,7 +98,6 @@ def _drawn_together(bound: CertifiedBound, error_MPa: Fraction) -> CertifiedBoun
                 last + (piece.to_MPa - last) / factor,
                 piece.low_V,
                 piece.high_V,
-                piece.curvature * factor**2,
             )
             for piece in bound.pieces
         )
@@ -238,7 +237,6 @@ def _corners(curve: OffsetCurve) -> list[Fraction]:
     pieces = list(curve.certified.pieces) if curve.certified else []
     if curve.above is not None:
         pieces += curve.above.bound.pieces
-        corners |= {deepest_MPa(piece) for piece in curve.above.bound.pieces if piece.curvature > 0}
     return sorted(corners | {end for piece in pieces for end in (piece.from_MPa, piece.to_MPa)})
 
 
@@ -265,20 +263,12 @@ def _stretch_above(curve: OffsetCurve, inside_MPa: Fraction) -> _Stretch:
     place = bisect_left(above.bound.pieces, inside_MPa, key=lambda piece: piece.to_MPa)
     piece = above.bound.pieces[place]
     passed = [above.least_V[place], piece.at(piece.from_MPa)]
-    if piece.curvature > 0 and piece.from_MPa < (deepest := deepest_MPa(piece)) < inside_MPa:
-        passed.append(piece.at(deepest))
     polynomial = _of_piece(piece)
     return _Stretch(
         offset=(polynomial, _constant(min(passed))),
         never_below_zero=True,
         bound=polynomial if above.certified else None,
     )
-
-
-def deepest_MPa(piece: BoundPiece) -> Fraction:
-    """Return where a sag is deepest, inside the piece or not, MPa."""
-    slope = (piece.high_V - piece.low_V) / (piece.to_MPa - piece.from_MPa)
-    return (piece.from_MPa + piece.to_MPa) / 2 - slope / piece.curvature
 
 
 def _constant(value: Fraction) -> Polynomial:
@@ -296,10 +286,9 @@ def _straight(curve: OffsetCurve, inside_MPa: Fraction) -> Polynomial:
 
 
 def _of_piece(piece: BoundPiece) -> Polynomial:
-    """Return the chord less its sag: M/2 (x - from) (to - x)."""
-    slope, sag = (piece.high_V - piece.low_V) / (piece.to_MPa - piece.from_MPa), piece.curvature / 2
-    at_zero = piece.low_V - slope * piece.from_MPa + sag * piece.from_MPa * piece.to_MPa
-    return at_zero, slope - sag * (piece.from_MPa + piece.to_MPa), sag
+    """Return the chord."""
+    slope = (piece.high_V - piece.low_V) / (piece.to_MPa - piece.from_MPa)
+    return piece.low_V - slope * piece.from_MPa, slope, NONE
 
 
 def _least(stretch: _Stretch, step: Fraction, begin: int, end: int) -> tuple[list[int], int] | None:

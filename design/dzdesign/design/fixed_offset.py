@@ -13,7 +13,6 @@ from itertools import pairwise
 
 from dzdesign.core.errors import InputError
 from dzdesign.core.worded import worded
-from dzdesign.design.ceiling import deepest_MPa
 from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs_at_tests import falling_corners, flow_at_end, remaining_dead_zone
@@ -131,11 +130,9 @@ def fixed_offset(compensator: Compensator, sign: int = 1) -> FixedOffset:
 
 
 def _lowest_places(piece: BoundPiece) -> Iterator[Fraction]:
-    """Yield where a piece of the bound may be lowest, MPa: its ends, and where its sag is deepest if that is inside."""
+    """Yield where a piece of the bound may be lowest, MPa: its ends."""
     yield piece.from_MPa
     yield piece.to_MPa
-    if piece.curvature > 0 and piece.from_MPa < (deepest := deepest_MPa(piece)) < piece.to_MPa:
-        yield deepest
 
 
 def _of_the_lot(compensator: Compensator, sign: int) -> Iterator[BoundPiece]:

@@ -18,7 +18,7 @@ import numpy as np
 from dzdesign.core.errors import InputError, RequirementError, and_more
 from dzdesign.core.worded import worded
 from dzdesign.design.beta_table import between_nodes, choose_beta_table
-from dzdesign.design.ceiling import OffsetCeiling, OffsetCurve, deepest_MPa, offset_ceiling
+from dzdesign.design.ceiling import OffsetCeiling, OffsetCurve, offset_ceiling
 from dzdesign.design.certificate import certified, guarded_curve
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs import costs_of
@@ -334,14 +334,11 @@ def _nearest(piece: BoundPiece, allowance: Allowance, first: int, drive_V: np.nd
     zero, step = float(signals.dp_MPa(0)), float(signals.dp_MPa(1) - signals.dp_MPa(0))
     from_MPa, to_MPa = float(piece.from_MPa), float(piece.to_MPa)
     low, high = (np.clip(zero + step * (codes + each), from_MPa, to_MPa) for each in allowance.window)
-    places = [low, high]
-    if piece.curvature > 0:
-        places.append(np.clip(float(deepest_MPa(piece)), low, high))
     bound = CertifiedBound(pieces=(piece,))
-    least = np.min([bound.in_doubles(place) for place in places], axis=0)
+    least = np.minimum(bound.in_doubles(low), bound.in_doubles(high))
     left_V = float(allowance.factor) * least - drive_V
     near: np.ndarray = np.flatnonzero(left_V <= left_V.min() + CLOSE_V)
-    if piece.curvature == 0 and piece.low_V == piece.high_V:  # a step: the largest drive comes nearest, the first of it
+    if piece.low_V == piece.high_V:  # a step: the largest drive comes nearest, the first of it
         return np.array([int(drive_V.argmax())])
     return near
 

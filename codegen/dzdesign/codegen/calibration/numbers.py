@@ -280,7 +280,7 @@ def valve_keys(compensator: Compensator) -> dict[str, tuple[str, ...]]:
     for sign in compensator.signals.signs:
         side = f"sides.{SIDE_NAMES[sign]}"
         curve = f"{side}.certified.{compensator.side(sign).certificate.guard}"
-        offset, bounds = f"{curve}.u_min0_V", (f"{curve}.offset_V", f"{curve}.u_lower_V", f"{curve}.curvature_V_MPa2")
+        offset, bounds = f"{curve}.u_min0_V", (f"{curve}.offset_V", f"{curve}.bound_V")
         # With a transition the law's offset is that of the opening threshold.
         opening = (f"{side}.opening_curve",) if compensator.transition_codes else ()
         found |= {

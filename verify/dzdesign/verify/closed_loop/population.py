@@ -24,7 +24,7 @@ from dzdesign.verify.closed_loop.drawn_machine import COMPONENTS, ZeroDrives, dr
 from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN, RECORD_S
 from dzdesign.verify.closed_loop.plant import LONGEST_KEY
 from dzdesign.verify.closed_loop.scene import DECIMALS, SETTLE_S, Scene
-from dzdesign.verify.exhaustive.zero_command import SaggingBound, Staircase, guarded_bounds
+from dzdesign.verify.exhaustive.zero_command import StraightBound, guarded_bounds
 from dzdesign.verify.loop_results import Population, Side
 
 #: Of one opening and closing, s: full command is held, closed quickly while the valve still is open, then slowly, so
@@ -39,7 +39,6 @@ NODES, HALVINGS = 16, 17
 #: Machines that run through the loop; and how many are drawn at once, which a processor's cache has room for.
 IN_LOOP, AT_ONCE = 200, 2048
 #: So far within the tested pressure drops, MPa, their ends are inside them in doubles too.
-WITHIN_MPA = 1e-9
 RECORDING = COMPONENTS.index("recording")
 NOT_DECLARED = (
     "machines are drawn from the declared one, and this compensator has none; design it again with --coil-temperature "
@@ -153,15 +152,8 @@ def _allowed(scene: Scene, dp_MPa: float) -> float:
 def _certified_V(scene: Scene, dp_MPa: np.ndarray) -> np.ndarray:
     """Return the certified bound at pressure drops, from the ramp tests again."""
     bounds = guarded_bounds(scene.compensator, scene.sign)
-    if bounds.premise != "monotone" and len(bounds.dp_MPa) > 1:
-        inside = np.clip(dp_MPa, bounds.dp_MPa[0] + WITHIN_MPA, bounds.dp_MPa[-1] - WITHIN_MPA)
-        return SaggingBound(bounds).least_in_doubles(inside, inside)
-    stairs = Staircase(bounds)
-    ends, levels = (np.array([float(each) for each in exact]) for exact in (stairs.dp_MPa, stairs.bounds_V))
-    inside = np.clip(dp_MPa, ends[0], ends[-1])
-    side, back = ("left", 0) if stairs.falling else ("right", 1)
-    found: np.ndarray = levels[np.searchsorted(ends, inside, side=side) - back]  # type: ignore[call-overload]
-    return found
+    inside = np.clip(dp_MPa, bounds.dp_MPa[0], bounds.dp_MPa[-1])
+    return StraightBound(bounds).least_in_doubles(inside, inside)
 
 
 def draw(count: int, random: np.random.Generator) -> np.ndarray:
