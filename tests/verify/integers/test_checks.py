@@ -6,10 +6,13 @@ from functools import partialmethod
 import numpy as np
 import pytest
 
+from dzdesign.codegen.integers.interface import interface_named
 from dzdesign.codegen.other_targets import generate_output
 from dzdesign.codegen.writing import write_generated
 from dzdesign.command_line.cli import main
 from dzdesign.core.errors import RequirementError
+from dzdesign.design.signal_text import command_signal, parse_signal
+from dzdesign.design.target_inputs import Converter
 from dzdesign.verify.folder import read_compensator, read_output_manifest
 from dzdesign.verify.outputs import texts
 from dzdesign.verify.outputs.every_pair import EveryPair
@@ -20,7 +23,7 @@ from dzdesign.verify.outputs.texts import (
     function_in_octave,
     running,
 )
-from tests.support.core_variants import variant
+from tests.support.core_variants import VARIANTS, variant
 from tests.support.octave import OCTAVE, compensator_of, needs_octave
 from tests.support.paths import GOLDENS, GOLDENS_FULL
 from tests.support.synthetic import needs_compiler
@@ -217,3 +220,15 @@ def test_a_block_of_two_solenoids_keeps_the_bounds_of_both(tmp_path):
     found = checks_of(tmp_path, "iec61131")
     assert all(check.holds for check in found.checks)
     assert [check.id for check in found.checks].count("over-compensation") == 2
+
+
+def test_each_side_of_a_block_is_compared_with_its_own_end_of_zero(tmp_path, monkeypatch):
+    command = command_signal(parse_signal("-10..10 V x 0.12 + 1.5 V", "--command-signal"), Converter())
+    monkeypatch.setitem(VARIANTS, "unlike sides", {"signals": {"command": command}})
+    made = variant("unlike sides")
+    sides = interface_named("plc", made).sides
+    assert sides[1].leave_zero != sides[-1].leave_zero
+    settings = {"dialect": "codesys", "interface": "plc"}
+    write_generated(generate_output(made, "iec61131", settings), tmp_path / "iec61131")
+    found = checks_of(tmp_path, "iec61131").checks
+    assert all(check.holds for check in found), [check.text for check in found if not check.holds]

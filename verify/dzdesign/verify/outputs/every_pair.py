@@ -263,7 +263,9 @@ class EveryPair:
         negative = (side < 0) if self.both else np.zeros_like(sound)
         towards = np.clip(np.where(negative, -away, away), 0, np.where(negative, last.span, first.span))
         if self.rests:
-            rest = (towards <= first.zero_band) | (rest & (towards <= first.leave_zero))
+            zero_band = np.where(negative, last.zero_band, first.zero_band)
+            leave_zero = np.where(negative, last.leave_zero, first.leave_zero)
+            rest = (towards <= zero_band) | (rest & (towards <= leave_zero))
             towards = np.where(rest, 0, towards)
         driven = sound & (side != 0)
         outputs, statuses, betas = [], [], []
