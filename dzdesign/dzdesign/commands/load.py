@@ -41,8 +41,8 @@ class Arguments:
     """Arguments of `load`."""
 
     block: Annotated[AnyPath | None, Option("BLOCK")] = None
-    """Calibration block to load, a .hex, .bin or .txt file of `dzdesign calibration` (default: none, the drive's block
-    is printed)."""
+    """Calibration block to load, a .hex or .bin file of `dzdesign calibration` (default: none, the drive's block is
+    printed)."""
     _: KW_ONLY
     port: Annotated[str, Option("PORT")]
     """Serial port, such as COM5 or /dev/ttyUSB0."""
