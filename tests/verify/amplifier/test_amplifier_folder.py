@@ -14,7 +14,7 @@ from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import OutputManifest
 from dzdesign.verify.outputs import amplifier
 from dzdesign.verify.outputs.verification import verify_output
-from dzdesign.verify.requirements import DEAD_ZONES, READ_BACK, REPRODUCED, SAFE
+from dzdesign.verify.requirements import DEAD_ZONES, RAMPS, READ_BACK, REPRODUCED, SAFE
 from tests.support.paths import GOLDENS, GOLDENS_FULL
 
 TABLE, FIRST = "dead_zones.csv", "positive,1.000000,opening,"
@@ -135,6 +135,18 @@ def test_the_command_says_what_does_not_hold(written, tmp_path, monkeypatch, cap
     assert main(["verify", str(folder), "-q"]) == 1
     (missed, _) = [line for line in capsys.readouterr().out.splitlines() if line.startswith("DOES NOT HOLD")]
     assert REPRODUCED.title in missed and "west.txt, line" in missed
+
+
+def test_the_recordings_that_are_given_are_compared_though_no_law_runs(written):
+    asked = []
+
+    def compared(runs):
+        asked.append(runs)
+        return [RAMPS.check(holds=True, text="every number is the same")]
+
+    verified = verify_output(written(*WEST), ramps=compared)
+    assert asked == [False], "an amplifier's file has no pressure inputs"
+    assert RAMPS.id in {check.id for check in verified.evidence.checks} and "recordings" not in verified.verdict
 
 
 def test_the_evidence_names_the_settings(written):

@@ -77,8 +77,8 @@ REQUIREMENTS: tuple[Tried[Given], ...] = (
     ),
     Tried(
         (requirements.RAMPS, requirements.PRESSURE_INPUTS),
-        lambda output: output.ramps(True) if output.ramps else (),
-        lambda output: bool(output.inputs),
+        lambda output: output.ramps(bool(output.inputs)) if output.ramps else (),
+        lambda output: as_generated(output.again, output.same),
     ),
 )
 
