@@ -100,7 +100,7 @@ def _check_imported(folder: Path, content: str, text: TextValues) -> None:
         cut = content.rindex("END_VAR\n") + len("END_VAR\n")
         if told != {content[:cut].strip(), content[cut:].rpartition("END_FUNCTION_BLOCK")[0].strip()}:
             raise RequirementError(f"{path.name} holds another text than {text.name}")
-        typed = {}
+        typed: dict[str, list[str]] = {}
         for each in top.iter(f"{NAMESPACE}variable"):
             values = [value.get("value", "") for value in each.iter(f"{NAMESPACE}simpleValue")]
             typed |= {each.get("name", ""): values} if values else {}
