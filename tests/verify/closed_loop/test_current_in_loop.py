@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dzdesign.codegen.project import generate
+from dzdesign.codegen.writing import write_generated
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.verify.closed_loop.drive_corners import RELEASED, coil_and_supply
@@ -90,6 +92,16 @@ def test_a_controller_that_begins_at_its_integral_opens_the_valve_as_it_is_relea
     flows = [max(each.figures[RELEASED] for each in found) for found, _ in (right, wrong)]
     assert flows[0] == 0.0 and flows[1] > 1e-3
     assert right[1].holds is True and wrong[1].holds is False
+
+
+def test_the_loop_of_a_block_is_that_of_fixed_numbers(example_valve, tmp_path):
+    """Of a controller in block form the same ramp is driven."""
+    compensator, drives = designed(example_valve, "cortex-m4", **MEASURED), []
+    for form in ("fixed", "block"):
+        write_generated(generate(compensator, "cortex-m4", form), tmp_path / form)
+        scene = scenes_of(tmp_path / form, compensator, None)[0]
+        drives.append(scene.loop.run(QUICK.command(), scene.dp_MPa, "compensated").compare)
+    assert np.array_equal(*drives) and drives[0].any()
 
 
 def test_a_drive_by_duty_has_no_coil(scenes):

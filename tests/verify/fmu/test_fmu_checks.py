@@ -48,6 +48,27 @@ def test_right_ones_hold(fmu, plant_fmu, compensator):
 
 
 @pytest.mark.parametrize(
+    ("check", "old", "new"),
+    (
+        (
+            physical_check,
+            "    one->changed = 1;\n    return 1;",
+            "    one->changed = one->phase != CONTINUOUS;\n    return 1;",
+        ),
+        (law_check, "    ticks_before(model, end);\n    model_outputs(model, 1);", "    ticks_before(model, end);"),
+        (
+            drive_check,
+            "    dz_drive_init(&model->drive);\n}",
+            "    if (!model->drive.valid_pressures)\n    dz_drive_init(&model->drive);\n}",
+        ),
+    ),
+    ids=("between events", "outputs of a step", "reset"),
+)  # fmt: skip
+def test_outputs_that_stay_as_they_were_are_seen(fmu, compensator, tmp_path, check, old, new):
+    assert failed(check(edited(fmu, tmp_path, "dz_fmu.c", old, new), compensator))
+
+
+@pytest.mark.parametrize(
     ("name", "old", "new"),
     (
         ("dz_fmu.c", "(double)dz_comp(codes", "1.0 + (double)dz_comp(codes"),

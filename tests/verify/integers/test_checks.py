@@ -92,6 +92,20 @@ def test_a_wrong_text_does_not_hold(folder, old, new, missed):
     assert missed <= {check.id for check in found if check.holds is False}
 
 
+@pytest.mark.parametrize(
+    ("file", "old", "new", "said"),
+    [
+        ("FB_DeadZone.xml", "MAX(", "MIN(", "another text"),
+        ("FB_DeadZone.TcPOU", "MAX(", "MIN(", "another text"),
+        ("FB_DeadZone.xml", '<simpleValue value="', '<simpleValue value="1', "other values"),
+    ],
+)
+def test_a_file_for_a_tool_with_another_block_is_seen(folder, file, old, new, said):
+    edited(folder / "iec61131" / file, old, new)
+    (check,) = checks_of(folder, "iec61131").checks
+    assert check.id == "exact-law" and check.holds is False and file in check.text and said in check.text
+
+
 def test_a_lower_bound_that_is_exceeded_is_seen(folder):
     path = folder / "iec61131" / "FB_DeadZone.st"
     text = path.read_text()

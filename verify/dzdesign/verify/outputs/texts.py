@@ -15,6 +15,7 @@ from functools import reduce
 from itertools import count
 from math import lcm
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -46,6 +47,9 @@ BLOCK, FUNCTIONS = "FB_DeadZone", {1: "dz_comp", -1: "dz_comp_negative"}
 INTERFACES = ("plc", "codes")
 #: What a function block remembers of a new instance.
 FIRST = {"side": "0", "at_rest": "TRUE"}
+#: Files that hold the block for a tool, and their elements with its text; PLCopen's has its values once more.
+IMPORTED, TEXT_OF_BLOCK = (".xml", ".TcPOU"), ("}xhtml", "Declaration", "ST")
+NAMESPACE = "{http://www.plcopen.org/xml/tc6_0200}"
 #: Of Octave: the program that it runs, and itself, the one without a window first.
 PROGRAM = Path(__file__).parent / "programs" / "answers_of.m"
 NAMES = ("octave-cli", "octave")
@@ -73,6 +77,7 @@ def block_checks(folder: Path, manifest: OutputManifest, compensator: Compensato
         text = TextValues(content, name)
         if text.first != {name: value for name, value in FIRST.items() if name in text.first}:
             raise RequirementError(f"{name} does not begin at rest: {text.first}")
+        _check_imported(folder, content, text)
         found = every_input_of(text.run, every, name)
     except Overflow as error:
         return OutputChecks(checks=(_named(OVERFLOW.check(holds=False, text=str(error)), name),))
@@ -82,6 +87,26 @@ def block_checks(folder: Path, manifest: OutputManifest, compensator: Compensato
     overflow = _named(OVERFLOW.check(holds=True, text=fits), name)
     zero = [_zero_command(text.run, every, place, name) for place in range(len(every.laws))]
     return replace(found, checks=(*found.checks, overflow, *zero))
+
+
+def _check_imported(folder: Path, content: str, text: TextValues) -> None:
+    """Refuse a file that a PLC's tool imports if it holds another block than the text that is evaluated."""
+    for path in sorted(each for each in folder.iterdir() if each.suffix in IMPORTED):
+        try:
+            top = ElementTree.fromstring(read_bytes(path, "function block as a tool imports it"))
+        except ElementTree.ParseError as error:
+            raise RequirementError(f"{path.name} is no XML: {error}") from error
+        told = {"".join(each.itertext()).strip() for each in top.iter() if each.tag.endswith(TEXT_OF_BLOCK)}
+        cut = content.rindex("END_VAR\n") + len("END_VAR\n")
+        if told != {content[:cut].strip(), content[cut:].rpartition("END_FUNCTION_BLOCK")[0].strip()}:
+            raise RequirementError(f"{path.name} holds another text than {text.name}")
+        typed: dict[str, list[str]] = {}
+        for each in top.iter(f"{NAMESPACE}variable"):
+            values = [value.get("value", "") for value in each.iter(f"{NAMESPACE}simpleValue")]
+            typed |= {each.get("name", ""): values} if values else {}
+        values_of = {name: [str(value) for value in np.ravel(each)] for name, each in text.known.items()}
+        if typed and typed != values_of | {name: [value] for name, value in text.first.items()}:
+            raise RequirementError(f"{path.name} holds other values than {text.name}")
 
 
 def function_checks(folder: Path, manifest: OutputManifest, compensator: Compensator, say: Say) -> OutputChecks:

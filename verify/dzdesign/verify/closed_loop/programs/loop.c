@@ -3,11 +3,11 @@
 #include <stdint.h>
 
 #include "dz_drive.h"
+#include "plant_period.h" /* with the header of the current controller, if there is one */
 
 #ifdef DZ_CALIBRATION_WORDS
-#include "bound.h"
+#include "bound.h" /* behind every header of the core */
 #endif
-#include "plant_period.h"
 
 #define RECORDED 9
 
