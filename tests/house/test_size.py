@@ -17,12 +17,12 @@ ROOM_SIZES = {
     "assess": (1705, 13, 0),
     "design": (6640, 30, 0),
     "codegen": (7430, 50, 7310),
-    "verify": (9498, 52, 2060),
+    "verify": (9502, 52, 2060),
     "report": (4400, 20, 535),
     "dzdesign": (10855, 91, 156),
 }
 #: Lines of Python of what is not shipped, and of the files that the tests compare with.
-TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 47900, 18000, 8930
+TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 47942, 18000, 8930
 #: Options of all commands together; an option of two commands counts twice.
 OPTIONS = 275
 #: What a number may be above what is there, before it is to be lowered.
