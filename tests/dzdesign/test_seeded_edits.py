@@ -111,6 +111,15 @@ def test_an_accidental_edit_is_named_and_nothing_of_it_is_run(verify, fault):
     assert status == expected and named in said, said
 
 
+def test_a_file_that_is_missing_is_reported_too(folder_of, tmp_path, capsys):
+    """The report is of a folder as it was verified: without that file."""
+    shutil.copytree(folder_of / "host", tmp_path / "host")
+    (tmp_path / "host" / "core" / "dz_drive.c").unlink()
+    assert main(["verify", str(tmp_path / "host"), "-o", str(tmp_path / "evidence")]) == 1
+    assert "core/dz_drive.c is missing" in capsys.readouterr().out
+    assert (tmp_path / "evidence" / "report.html").is_file()
+
+
 #: Of an output other than a C firmware, and what the verdict names.
 OUTPUTS = {
     "a digit of the text": ("iec61131", lambda f: edit(f, "FB_DeadZone.st", "1", "2"), "FB_DeadZone.st, line"),
