@@ -54,7 +54,7 @@ def is_next(firmware):
 
 
 #: What running a core leaves, for the evidence and for what is tried next.
-LEFT = ("scenes", "inputs", "curves", "current", "loop", "compared")
+LEFT = ("scenes", "inputs", "curves", "current", "loop")
 #: Rows of requirements that run the core, up to the closed loop.
 CORE = verification.REQUIREMENTS[2:8]
 

@@ -13,6 +13,7 @@ from dzdesign.derivation import scaling
 from dzdesign.derivation.law import LAW_NAMES, law
 from dzdesign.derivation.scaling import COMMAND_CODE, COMPARE_VALUE, Line
 from dzdesign.derivation.symbols import beta, k, n_adc, n_full, u_i, u_max, u_min0, u_O, x_max
+from dzdesign.derivation.symbols import kappa as kappa_symbol
 from tests.support.synthetic import needs_compiler
 
 DIGITS = 50
@@ -145,10 +146,10 @@ def test_the_law_in_counts_in_doubles(name, seed):
     assert all(isinstance(part, np.ndarray) for part in in_numpy)
     for index, values in enumerate(zip(b, kappa, share, strict=True)):
         true = scaling.law_in_counts(law(name))
-        names = dict(zip((beta, scaling.kappa, scaling.mu), map(rational, values), strict=True))
+        names = dict(zip((beta, kappa_symbol, scaling.mu), map(rational, values), strict=True))
         precise = Line(*(sympy.N(part.subs({**names, n_adc: 4095, n_full: 60000}), DIGITS) for part in true))
         terms = Line(
-            slope=sympy.Rational(60000, 4095) * (names[beta] * (names[scaling.kappa] + 1) + 1), start=precise.start
+            slope=sympy.Rational(60000, 4095) * (names[beta] * (names[kappa_symbol] + 1) + 1), start=precise.start
         )
         for found in (line(*values), Line(*(part[index] for part in in_numpy)), Line(*map(float, in_casadi(*values)))):
             for part, reference, scale in zip(found, precise, terms, strict=True):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from dzdesign.design.current.circuit import CoilCircuit, CurrentSensor
-from dzdesign.design.current.drive import choose_loop, gains_of, sensor_line
+from dzdesign.design.current.drive import choose_loop, gains_of
 from dzdesign.design.current.responses import Gains, margins, run_loop
 from dzdesign.verify.current import corner_runs
 from dzdesign.verify.current.coil import CoilLoop, CoilSimulation, least_rise_s
@@ -153,8 +153,8 @@ def test_what_design_reckons_with_is_what_the_c_does(name):
     """Every compare value of every corner over steps up and down, from rest on; the current to a nanoampere."""
     loop, corners = example_loop(name), list(COIL.corners())
     around = CoilLoop(loop=loop, circuit=COIL, sensor=SENSORS[name], converter=CONVERTER, sampling=SAMPLING)
-    simulated, line = CoilSimulation(around, current_texts(loop)), sensor_line(SENSORS[name], CONVERTER)
-    means, compares = run_loop(loop, COIL, corners, SAMPLING, line, STEPS)
+    simulated = CoilSimulation(around, current_texts(loop))
+    means, compares = run_loop(loop, asked(SENSORS[name]), corners, STEPS)
     for place, corner in enumerate(corners):
         found = simulated.run(corner, STEPS)
         assert not found["faults"].any()

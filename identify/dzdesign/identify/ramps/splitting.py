@@ -273,7 +273,7 @@ def nominal_dp(test: RampTest) -> float | None:
     if shut.size < 5:
         return median(test.dp[test.q <= np.quantile(test.q, 0.1)])
     wherever_shut = test.dp[(test.u >= 0) & (np.abs(test.q) <= SHUT_FLOW * np.abs(test.q).max())]
-    if swings_about(median(wherever_shut), spread_of(wherever_shut)):
+    if wherever_shut.size and swings_about(median(wherever_shut), spread_of(wherever_shut)):
         return level_of_swings(wherever_shut)
     return median(shut)
 
