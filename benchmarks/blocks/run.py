@@ -10,6 +10,7 @@ from pathlib import Path
 for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "POLARS_MAX_THREADS"):
     os.environ.setdefault(_threads, "1")
 sys.path.insert(0, str(Path(__file__).parents[1]))  # for the scoreboard that all benchmarks share
+sys.path.insert(0, str(Path(__file__).parents[2]))  # for what tests support
 
 from block_designs import print_block_designs  # noqa: E402
 from block_equality import print_block_equality  # noqa: E402

@@ -15,6 +15,7 @@ from pathlib import Path
 from time import perf_counter
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # for the scoreboard that all benchmarks share
+sys.path.insert(0, str(Path(__file__).parents[2]))  # for what tests support
 sys.path.insert(0, str(Path(__file__).parents[1] / "blocks"))  # for the designs in both forms
 
 import on_avr

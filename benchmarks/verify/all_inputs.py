@@ -113,12 +113,13 @@ def _bare_batch(firmware: Path) -> Callable[[int], object]:
 
 def _by_fractions(firmware: Path, compensator: Compensator, count: int, seed: int) -> None:
     """Compare `count` random inputs one by one, as one would in plain Python."""
-    names = ("dz_comp.c", "dz_comp.h")
+    names = ("dz_comp.c", "dz_comp.h", "dz_calibration.h", "dz_valve.h")
     dz_comp = load_library({name: (firmware / "core" / name).read_text() for name in names}, "the core").dz_comp
     dz_comp.argtypes, dz_comp.restype = [ctypes.c_uint16] * 3, ctypes.c_uint16
-    draw, last = random.Random(seed), compensator.signals.code_max
+    draw, signals = random.Random(seed), compensator.signals
+    read = [each.valid_codes for each in (signals.command, signals.pressure_a, signals.pressure_b)]
     for _ in range(count):
-        command, p_a, p_b = (draw.randint(0, last) for _ in range(3))
+        command, p_a, p_b = (draw.randint(*ends) for ends in read)
         if dz_comp(command, p_a, p_b) != compensator.compare(command, p_a - p_b):
             raise RuntimeError(f"the core is wrong at {(command, p_a, p_b)}")
 
