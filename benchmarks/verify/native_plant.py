@@ -77,7 +77,7 @@ def print_native_plant(*, quick: bool, seed: int) -> list[Row]:
 def _rows(name: str, scene: Scene, quick: bool, parameters: Mapping[str, float]) -> Iterator[Row]:
     say(name)
     found = compare(Window.of(scene, QUICK_S if quick else WHOLE_S, **parameters))
-    note = f"steps of {1e6 * found.step_s:.0f} us; {found.impacts} stops met; at most {found.q_largest_L_min:.3g} L/min"
+    note = f"{found.impacts} stops met; at most {found.q_largest_L_min:.3g} L/min"
     yield Row(what=f"{name}: position, of the stroke", value=found.position_difference, limit=MOST_APART, note=note)
     yield Row(what=f"{name}: flow, of the largest", value=found.flow_difference, limit=MOST_APART)
 
