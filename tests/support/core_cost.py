@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dzdesign.core.errors import RequirementError
-from dzdesign.core.processes.running import run_program
+from dzdesign.core.processes import run_program
 from dzdesign.verify.toolchain.compiled_core import embedded
 from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4, Machine, block_of
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from dzdesign.batch.calibration import Outcome, Task, calibrate
 from dzdesign.core.artefact_types import THIS_TOOL
 from dzdesign.core.errors import InputError, and_more
-from dzdesign.core.processes.workers import end_with, interrupts_kept_waiting, safe_path
+from dzdesign.core.processes import end_with, interrupts_kept_waiting, safe_path
 from dzdesign.report.lot.summary import FAILED
 from dzdesign.terminal.progress import say
 

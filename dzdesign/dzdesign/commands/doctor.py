@@ -9,8 +9,7 @@ from operator import attrgetter
 from typing import NamedTuple
 
 from dzdesign.core.errors import DzdesignError
-from dzdesign.core.processes.programs import find_program
-from dzdesign.core.processes.running import run_program
+from dzdesign.core.processes import find_program, run_program
 from dzdesign.terminal.page import new_console, print_json, put_line, put_rows
 
 TINY = "#include <stdint.h>\nint32_t dz_tiny(int32_t a);\nint32_t dz_tiny(int32_t a) { return 3 * a; }\n"

@@ -12,7 +12,7 @@ import pytest
 from dzdesign.batch.runners import _in_processes
 from dzdesign.core.errors import InputError
 from dzdesign.core.input_files import MOST_DOCUMENT, read_recording
-from dzdesign.core.processes.workers import end_with
+from dzdesign.core.processes import end_with
 from tests.support.many_valves import recordings
 
 #: What a start of Python, NumPy, joblib or CasADi imports.
@@ -20,7 +20,7 @@ MODULES = ("json", "socket", "numpy", "joblib", "casadi", "msgspec", "sitecustom
 DZDESIGN = Path(sys.executable).with_name("dzdesign.exe" if sys.platform == "win32" else "dzdesign")
 CHILD = """
 import os, sys, time
-from dzdesign.core.processes.workers import end_with
+from dzdesign.core.processes import end_with
 from dzdesign.core.scratch import process_folder
 end_with(os.getppid())
 print(os.getpid(), process_folder(), flush=True)

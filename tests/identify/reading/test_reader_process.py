@@ -18,7 +18,7 @@ DZDESIGN = Path(sys.executable).with_name("dzdesign.exe" if sys.platform == "win
 ASKING = """
 import os, signal, time
 signal.signal(getattr(signal, "SIGHUP", signal.SIGTERM), signal.SIG_DFL)
-from dzdesign.core.processes.workers import interrupts_kept_waiting
+from dzdesign.core.processes import interrupts_kept_waiting
 from dzdesign.identify.reading.binary_table import _reader
 with interrupts_kept_waiting():
     reader = _reader(os.getpid())

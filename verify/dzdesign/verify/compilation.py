@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dzdesign.core.errors import InputError, RequirementError
-from dzdesign.core.processes.programs import find_program
+from dzdesign.core.processes import find_program
 from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.verify import requirements
 from dzdesign.verify.folder import USER_FOLDER, changed_board_files, user_files

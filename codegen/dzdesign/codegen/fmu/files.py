@@ -27,7 +27,7 @@ from dzdesign.codegen.fmu.description import SOURCE, Model, model_description
 from dzdesign.codegen.fmu.models import compensator_model, plant_model, plant_of
 from dzdesign.core.artefact_files import TOOL, sha256_of
 from dzdesign.core.errors import MissingToolError, quoted
-from dzdesign.core.processes.running import run_program
+from dzdesign.core.processes import run_program
 from dzdesign.core.scratch import scratch_folder
 from dzdesign.core.strict_templates import strict_templates
 from dzdesign.design.compensator import Compensator

@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, BinaryIO, final
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.core.processes.workers import end_with, interrupts_kept_waiting, safe_path
+from dzdesign.core.processes import end_with, interrupts_kept_waiting, safe_path
 from dzdesign.core.scratch import scratch_folder
 from dzdesign.identify.reading import formats
 from dzdesign.identify.reading.formats.file_format import NO_NUMBERS_UNIT, NUMBER_KINDS, FileColumn, FileFormat

@@ -21,8 +21,7 @@ import numpy as np
 
 from dzdesign.core.artefact_files import read_bytes
 from dzdesign.core.errors import InputError, RequirementError
-from dzdesign.core.processes.programs import find_program
-from dzdesign.core.processes.running import run_program
+from dzdesign.core.processes import find_program, run_program
 from dzdesign.core.scratch import scratch_folder
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import OutputManifest

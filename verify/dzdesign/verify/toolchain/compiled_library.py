@@ -17,7 +17,6 @@ from threading import Event, Lock, Timer
 import numpy as np
 
 from dzdesign.core.errors import RequirementError
-from dzdesign.core.processes.running import ended_with_this_process, start_watch
 from dzdesign.verify.toolchain.host_compiler import built, host_compiler, words_of
 from dzdesign.verify.toolchain.machines import HOST_FLAGS, reason_of
 
@@ -121,15 +120,13 @@ class CompiledLibrary:
         return 0
 
     def _started(self) -> "subprocess.Popen[bytes]":
-        """Start the child process, and have it end with this object and with dzdesign."""
+        """Start the child process, and have it end with this object; without dzdesign it reads no further call, and ends."""
         with contextlib.ExitStack() as stack:
             self._errors = stack.enter_context(tempfile.TemporaryFile())
-            start_watch()
             process = subprocess.Popen(
                 [sys.executable, "-I", "-S", str(SERVER), str(self._library)], stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE, stderr=self._errors, start_new_session=sys.platform != "win32",
             )  # fmt: skip
-            stack.enter_context(ended_with_this_process(process.pid))
             stack.callback(_end, process)
             _widen(process)
             self._ends = weakref.finalize(self, stack.pop_all().close)

@@ -17,8 +17,7 @@ import platformdirs
 
 from dzdesign.core.artefact_files import sha256_of_octets
 from dzdesign.core.errors import InputError, RequirementError
-from dzdesign.core.processes.programs import find_program
-from dzdesign.core.processes.running import run_program
+from dzdesign.core.processes import find_program, run_program
 from dzdesign.core.scratch import process_folder
 
 #: What the generated core must bear without a word.

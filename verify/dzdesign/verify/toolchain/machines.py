@@ -20,8 +20,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from dzdesign.core.errors import RequirementError
-from dzdesign.core.processes.programs import find_program
-from dzdesign.core.processes.running import run_program
+from dzdesign.core.processes import find_program, run_program
 from dzdesign.design.firmware_manifest import BLOCK_FILE
 from dzdesign.verify.toolchain.host_compiler import built, host_compiler, words_of
 

@@ -1,1 +1,0 @@
-"""Programs that dzdesign starts and waits for: a command in, its exit status and what it wrote out."""
