@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 from dzdesign.block_drives import drives_checked
 from dzdesign.block_identity import beside_another, of_another_valve, repeated
-from dzdesign.core.artefact_files import read_bytes, sha256_of
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import SourceFile
+from dzdesign.core.documents import read_bytes, sha256_of
 from dzdesign.core.errors import InputError, RequirementError, quoted
 from dzdesign.stages.given_compensator import refuse_underived
 

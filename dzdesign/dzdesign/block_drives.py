@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dzdesign.core.errors import and_more
-from dzdesign.core.scratch import scratch_folder
+from dzdesign.core.placing import scratch_folder
 
 if TYPE_CHECKING:
     from dzdesign.codegen.calibration.layout import CalibrationBlock

@@ -9,7 +9,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
+from dzdesign.core.artefact_files import MANIFEST_NAME
+from dzdesign.core.documents import sha256_of
 from dzdesign.core.errors import InputError, and_more, quoted
 
 if TYPE_CHECKING:

@@ -16,9 +16,9 @@ from dzdesign.assess.measured_curves import MOST_POINTS, MOST_SAMPLES
 from dzdesign.assess.options import AssessOptions
 from dzdesign.assess.quantities import QUANTITIES, observed
 from dzdesign.command_line.cli import main
-from dzdesign.core.artefact_files import to_json
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import RuleError, as_document, to_json_bytes
+from dzdesign.core.documents import to_json
 from dzdesign.core.errors import InputError
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_files import read_ramp_file

@@ -9,9 +9,9 @@ from dzdesign.codegen.project import generate
 from dzdesign.codegen.writing import write_generated
 from dzdesign.command_line.cli import main
 from dzdesign.core import artefact_files
-from dzdesign.core.artefact_files import to_json
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import to_json_bytes
+from dzdesign.core.documents import to_json
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from tests.support.paths import GOLDENS_FULL

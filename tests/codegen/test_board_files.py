@@ -11,8 +11,9 @@ from dzdesign import api
 from dzdesign.codegen.project import generate, targets
 from dzdesign.codegen.writing import write_generated
 from dzdesign.command_line.cli import main
-from dzdesign.core.artefact_files import MANIFEST_NAME, to_json, write_folder
+from dzdesign.core.artefact_files import MANIFEST_NAME, write_folder
 from dzdesign.core.artefact_types import to_json_bytes
+from dzdesign.core.documents import to_json
 from dzdesign.core.errors import InputError
 from dzdesign.design.designing import design
 from dzdesign.regeneration import regenerated

@@ -15,8 +15,9 @@ import pytest
 from dzdesign.codegen import banner
 from dzdesign.codegen.project import generate
 from dzdesign.command_line.cli import main
-from dzdesign.core.artefact_files import MANIFEST_NAME, check_inside, sha256_of, to_json, write_files, write_folder
+from dzdesign.core.artefact_files import MANIFEST_NAME, check_inside, write_files, write_folder
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile
+from dzdesign.core.documents import sha256_of, to_json
 from dzdesign.core.errors import InputError, one_line
 from dzdesign.design.firmware_manifest import FirmwareManifest, FirmwareOrigin
 from dzdesign.identify.valve.model import Warning_

@@ -12,12 +12,10 @@ from dzdesign.core.artefact_files import (
     MANIFEST_NAME,
     check_file_may_be_written,
     check_folder_may_be_written,
-    parse_document,
-    read_bytes,
-    to_json,
     write_file,
     write_folder,
 )
+from dzdesign.core.documents import parse_document, read_bytes, to_json
 from dzdesign.core.errors import InputError, one_line
 from dzdesign.core.units import parse_quantity, si_factor
 

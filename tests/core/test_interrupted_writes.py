@@ -95,7 +95,7 @@ def test_the_next_run_brings_an_old_folder_back(rows):
     beside = 0
     for row in rest:
         after = without_litter(row["after"])
-        retired = {name.partition("/old/")[2]: text for name, text in after.items() if name.startswith(RETIRED)}
+        retired = {name.partition("/")[2]: text for name, text in after.items() if name.startswith(RETIRED)}
         stands = {name: text for name, text in after.items() if name.startswith("firmware/")}
         assert stands in (first["old"], first["new"]) or (
             row["way"] in ("SIGKILL", "SIGINT")

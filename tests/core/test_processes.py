@@ -1,4 +1,4 @@
-"""Programs are those of PATH that are named in full, never of the working folder; they end in time, with their children."""
+"""Programs are those of PATH that are named in full, never of the working folder; they end with their children."""
 
 import os
 import signal

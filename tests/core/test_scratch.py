@@ -9,12 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from dzdesign.core import scratch
-from dzdesign.core.scratch import ABANDONED_S, MARK, PREFIX, is_scratch, scratch_folder
+from dzdesign.core.placing import ABANDONED_S, SCRATCH, is_scratch, scratch_folder
 
 HOLDS = """
 import sys
-from dzdesign.core.scratch import process_folder, scratch_folder
+from dzdesign.core.placing import process_folder, scratch_folder
 with scratch_folder() as folder:
     (folder / "big.o").write_text("x")
     print(process_folder(), folder, flush=True)
@@ -25,7 +24,6 @@ with scratch_folder() as folder:
 @pytest.fixture
 def place(tmp_path, monkeypatch):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    scratch._remove_abandoned.cache_clear()
     return tmp_path
 
 
@@ -50,7 +48,7 @@ def test_folders_of_a_killed_process_go_with_a_later_one_and_those_of_a_living_o
     killed.communicate()
     long_ago = time.time() - 2 * ABANDONED_S
     for folder in abandoned:
-        os.utime(folder / MARK, (long_ago, long_ago))
+        os.utime(folder, (long_ago, long_ago))
     living, used = holder(place)
     assert all(path.is_dir() for path in used)
     assert not any(path.exists() for path in abandoned), "the living one removed them"
@@ -60,23 +58,14 @@ def test_folders_of_a_killed_process_go_with_a_later_one_and_those_of_a_living_o
     assert not list(place.iterdir())
 
 
-def test_a_users_folder_of_such_a_name_stays(place):
-    (place / f"{PREFIX}mylot").mkdir()
-    (place / f"{PREFIX}mylot/precious.csv").write_text("1")
-    (place / f"{PREFIX}empty").mkdir()
-    with scratch_folder():
-        pass
-    assert (place / f"{PREFIX}mylot/precious.csv").read_text() == "1" and (place / f"{PREFIX}empty").is_dir()
-
-
 @pytest.mark.skipif(sys.platform == "win32", reason="no such links")
 def test_nothing_is_removed_through_a_link(place, tmp_path_factory):
     other = tmp_path_factory.mktemp("others")
     (other / "file").write_text("kept")
-    (other / MARK).touch()
     long_ago = time.time() - 2 * ABANDONED_S
-    os.utime(other / MARK, (long_ago, long_ago))
-    (place / f"{PREFIX}link").symlink_to(other)
+    os.utime(other, (long_ago, long_ago))
+    (place / f"{SCRATCH}link").symlink_to(other)
+    os.utime(place / f"{SCRATCH}link", (long_ago, long_ago), follow_symlinks=False)
     with scratch_folder() as folder:
         folder.rename(place / "moved")
         folder.symlink_to(other)

@@ -4,8 +4,8 @@ import tracemalloc
 
 import pytest
 
+from dzdesign.core.documents import LONGEST_ROW, read_toml
 from dzdesign.core.errors import InputError
-from dzdesign.core.toml_documents import LONGEST_ROW, read_toml
 
 ROW = LONGEST_ROW - 10
 

@@ -8,9 +8,9 @@ import pytest
 from dzdesign import api
 from dzdesign.codegen.project import generate, target_named
 from dzdesign.command_line.cli import main
-from dzdesign.core.artefact_files import to_json
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import to_json_bytes
+from dzdesign.core.documents import to_json
 from dzdesign.core.errors import InputError
 from dzdesign.design import redesign
 from dzdesign.design.compensator import Compensator

@@ -8,8 +8,8 @@ import pytest
 
 from dzdesign import api
 from dzdesign.command_line.cli import main
-from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.documents import sha256_of
 from dzdesign.core.errors import InputError
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.regeneration import regenerated

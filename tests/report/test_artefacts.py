@@ -19,9 +19,10 @@ from dzdesign.assess.assessment import (
 from dzdesign.assess.limits import LimitResult
 from dzdesign.assess.quantities import Quantity, Reading
 from dzdesign.command_line.cli import main
-from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of, to_json
+from dzdesign.core.artefact_files import MANIFEST_NAME
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import THIS_TOOL, to_json_bytes
+from dzdesign.core.documents import sha256_of, to_json
 from dzdesign.core.errors import InputError
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.artefacts import read_chain

@@ -15,8 +15,8 @@ import pytest
 from dzdesign.batch.printing import print_lot
 from dzdesign.batch.results import Results
 from dzdesign.command_line.cli import main
-from dzdesign.core.artefact_files import sha256_of, to_json
 from dzdesign.core.artefact_types import as_document
+from dzdesign.core.documents import sha256_of, to_json
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import AS_COMPUTED, CommandUnit, PressureUnit, RecordedUnits
 from dzdesign.report.figure import figure_style

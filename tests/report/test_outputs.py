@@ -9,9 +9,10 @@ from dzdesign.codegen.other_targets import generate_output, settings_of
 from dzdesign.codegen.project import generate
 from dzdesign.codegen.writing import write_generated
 from dzdesign.command_line.cli import main
-from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of, write_folder
+from dzdesign.core.artefact_files import MANIFEST_NAME, write_folder
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
+from dzdesign.core.documents import sha256_of
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareOrigin
 from dzdesign.report.artefacts import Chain, MadeOutput, MadeOutputs, Place, change_in, outputs_in

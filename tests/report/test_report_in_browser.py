@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from dzdesign.core.artefact_files import to_json
+from dzdesign.core.documents import to_json
 from dzdesign.report.artefacts import read_chain
 from dzdesign.report.lot.page import report_of_lot
 from dzdesign.report.valve_report import REPORT_NAME, make_report, report_of_folder

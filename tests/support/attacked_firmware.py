@@ -4,8 +4,8 @@ import json
 from dataclasses import replace
 from functools import cache
 
-from dzdesign.core.artefact_files import sha256_of, to_json
 from dzdesign.core.artefact_types import to_json_bytes
+from dzdesign.core.documents import sha256_of, to_json
 from dzdesign.report import valve_report
 from dzdesign.verify import verification
 from dzdesign.verify.requirements import REPRODUCED, Tried, checks_of

@@ -8,7 +8,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from dzdesign.core.errors import RequirementError
-from dzdesign.core.scratch import scratch_folder
+from dzdesign.core.placing import scratch_folder
 from dzdesign.verify.toolchain.host_compiler import check_strictly, host_compiler
 
 TARGET = "f28335"

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from dzdesign.core.errors import RequirementError
+from dzdesign.core.placing import scratch_folder
 from dzdesign.core.processes import run_program
-from dzdesign.core.scratch import scratch_folder
 from dzdesign.verify.folder import read_compensator
 from dzdesign.verify.toolchain.machines import block_of
 

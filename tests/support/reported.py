@@ -3,7 +3,8 @@
 import json
 from pathlib import Path
 
-from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of, to_json
+from dzdesign.core.artefact_files import MANIFEST_NAME
+from dzdesign.core.documents import sha256_of, to_json
 
 
 def change_json(path: Path, change) -> bytes:

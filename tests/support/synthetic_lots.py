@@ -7,7 +7,7 @@ import numpy as np
 
 from dzdesign.batch.results import Results
 from dzdesign.batch.summary import summary_of
-from dzdesign.core.artefact_files import sha256_of
+from dzdesign.core.documents import sha256_of
 from dzdesign.report.lot.table import HASHED, SIDE_COLUMNS, Cell, column_of, frame_of, table_files
 
 REASONS = (

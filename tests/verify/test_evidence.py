@@ -4,9 +4,9 @@ import json
 from dataclasses import replace
 from types import SimpleNamespace
 
-from dzdesign.core.artefact_files import to_json
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import to_json_bytes
+from dzdesign.core.documents import to_json
 from dzdesign.core.errors import InputError
 from dzdesign.core.verdicts import DOES_NOT_HOLD, NOT_CHECKED
 from dzdesign.verify import requirements

@@ -9,8 +9,8 @@ from dzdesign.codegen import project
 from dzdesign.codegen.calibration.block import block_of
 from dzdesign.codegen.project import generate
 from dzdesign.codegen.writing import write_generated
-from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.artefact_types import to_json_bytes
+from dzdesign.core.documents import sha256_of
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs, input_checks
 from dzdesign.verify.exhaustive.block_check import own_block_accepted
 from dzdesign.verify.exhaustive.drive_check import drive_follows

@@ -7,7 +7,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from dzdesign.core.artefact_files import to_json, write_folder
+from dzdesign.core.artefact_files import write_folder
+from dzdesign.core.documents import to_json
 from dzdesign.core.errors import InputError
 from dzdesign.verify.closed_loop.loop import ClosedLoop, RampSequence
 from dzdesign.verify.closed_loop.plant import Plant

@@ -26,8 +26,8 @@ from dzdesign.codegen.loading.protocol import LOAD_FILES, STORE, load_context
 from dzdesign.codegen.target import Target, folder_of
 from dzdesign.codegen.vectors import vectors_text
 from dzdesign.codegen.wiring import wiring_of
-from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
+from dzdesign.core.documents import sha256_of
 from dzdesign.core.errors import DzdesignError, InputError, nearest
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.core.strict_templates import strict_templates

@@ -7,12 +7,11 @@ from typing import TypeVar
 
 from dzdesign.codegen.other_targets import Output
 from dzdesign.codegen.project import Firmware
-from dzdesign.core.artefact_files import read_bytes, write_folder
+from dzdesign.core.artefact_files import manifest_of, write_folder
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import schema_of
-from dzdesign.core.documents import family_of
+from dzdesign.core.documents import family_of, read_bytes
 from dzdesign.core.errors import InputError, and_more, quoted
-from dzdesign.core.folder_contents import manifest_of
 from dzdesign.core.options import flag_of
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest, OutputManifest

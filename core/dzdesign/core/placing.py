@@ -2,39 +2,82 @@
 
 A rename may reach the disk before the content of what is renamed; after a power cut the name then leads to empty files.
 Everything that is written whole is therefore synced in this order: its files, its folders, then the rename, then the
-folder that holds the name.
+folder that holds the name. Temporary folders go with their process, and need none of this.
 """
 
+import atexit
 import contextlib
 import os
 import secrets
 import shutil
+import tempfile
 import time
+from collections.abc import Iterator
+from functools import cache
 from hashlib import sha256
 from pathlib import Path
 
-#: How files and folders are called until they are put in their place.
-UNPLACED = ".dzdesign-new-"
-#: How a place is called in which an old folder waits until the new one stands.
+from dzdesign.core.errors import InputError
+
+#: How files and folders are called until they are put in their place, and folders in that for temporary files.
+UNPLACED, SCRATCH = ".dzdesign-new-", ".dzdesign-tmp-"
+#: How an old folder is called until the new one stands.
 RETIRED = ".dzdesign-old-"
-#: What waits for its place for longer was left by a process that was killed, s.
-ABANDONED_S = 3600.0
+#: Of this age it was left by a process that was killed, s: no command runs for three days.
+ABANDONED_S = 3 * 86_400.0
 #: Windows opens no folder; its file systems write names and their changes into a journal in order.
 FOLDERS_OPEN = os.name == "posix"
 
-
-def beside(path: Path) -> Path:
-    """Return a name beside `path` that nothing has; hidden, and short, for a file's name may be as long as can be."""
-    return path.parent / f"{UNPLACED}{secrets.token_hex(6)}"
+#: The temporary folders of this process.
+_held: set[Path] = set()
 
 
-def remove_abandoned(folder: Path) -> None:
-    """Remove what a killed process had begun to write in `folder`."""
+@contextlib.contextmanager
+def scratch_folder() -> Iterator[Path]:
+    """Create a temporary folder that is removed at the end of the context."""
+    try:
+        place = tempfile.gettempdir()
+    except FileNotFoundError as error:
+        raise InputError(
+            "no folder for temporary files can be written into; set TMPDIR to one that can, and make room there"
+        ) from error
+    remove_abandoned(Path(place), SCRATCH)
+    folder = Path(os.path.realpath(tempfile.mkdtemp(prefix=SCRATCH)))
+    _held.add(folder)
+    try:
+        yield folder
+    finally:
+        _held.discard(folder)
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+@cache
+def process_folder() -> Path:
+    """Return a temporary folder that is removed when this process ends."""
+    stack = contextlib.ExitStack()
+    atexit.register(stack.close)
+    return stack.enter_context(scratch_folder())
+
+
+def is_scratch(path: Path) -> bool:
+    """Tell whether a path lies in a temporary folder of this process: no power cut matters to it."""
+    place = Path(os.path.realpath(path))
+    return any(folder == place or folder in place.parents for folder in _held)
+
+
+def remove_scratch() -> None:
+    """Remove the folders of this process now, before it ends by a way on which nothing else is done."""
+    for folder in list(_held):
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def remove_abandoned(folder: Path, prefix: str = UNPLACED) -> None:
+    """Remove what a killed process had begun to write in `folder`; nothing is removed through a link."""
     with contextlib.suppress(OSError), os.scandir(folder) as entries:
         for entry in entries:
-            if not entry.name.startswith(UNPLACED):
-                continue
             with contextlib.suppress(OSError):
+                if not entry.name.startswith(prefix):
+                    continue
                 if time.time() - entry.stat(follow_symlinks=False).st_mtime < ABANDONED_S:
                     continue
                 if entry.is_dir(follow_symlinks=False):
@@ -43,30 +86,25 @@ def remove_abandoned(folder: Path) -> None:
                     os.unlink(entry.path)
 
 
+def beside(path: Path) -> Path:
+    """Return a name beside `path` that nothing has; hidden, and short, for a file's name may be as long as can be."""
+    return path.parent / f"{UNPLACED}{secrets.token_hex(6)}"
+
+
 def put_in_place(staging: Path, folder: Path) -> None:
     """Put `staging` in the place of `folder`, which exists and goes.
 
     In two steps: between them a kill leaves the old folder beside its place, from where `bring_back` fetches it.
     """
     retired = _retired(folder)
-    old = retired / "old"
-    retired.mkdir(exist_ok=True)
     try:
-        os.replace(folder, old)
+        os.replace(folder, retired)
         os.replace(staging, folder)
         sync_folder(folder.parent)  # before the old one is removed: the removal must not reach the disk alone
     except BaseException:
-        if old.exists() and not folder.exists():
-            os.replace(old, folder)
-        with contextlib.suppress(OSError):  # not empty if the old one could not come back: then it stays there
-            retired.rmdir()
+        bring_back(folder)
         raise
     shutil.rmtree(retired, ignore_errors=True)
-
-
-def _retired(folder: Path) -> Path:
-    """Return where a folder stands between two steps: a name that no person gives, and short, as of `beside`."""
-    return folder.parent / f"{RETIRED}{sha256(os.fsencode(folder.name)).hexdigest()[:16]}"
 
 
 def bring_back(folder: Path) -> None:
@@ -74,9 +112,15 @@ def bring_back(folder: Path) -> None:
     retired = _retired(folder)
     if not retired.is_dir():
         return
-    if not os.path.lexists(folder) and (retired / "old").is_dir():
-        os.replace(retired / "old", folder)
-    shutil.rmtree(retired, ignore_errors=True)
+    if os.path.lexists(folder):
+        shutil.rmtree(retired, ignore_errors=True)
+    else:
+        os.replace(retired, folder)
+
+
+def _retired(folder: Path) -> Path:
+    """Return where a folder stands between two steps: a name that no person gives, and short, as of `beside`."""
+    return folder.parent / f"{RETIRED}{sha256(os.fsencode(folder.name)).hexdigest()[:16]}"
 
 
 def sync_file(path: Path) -> None:
@@ -106,22 +150,17 @@ def make_folder(path: Path) -> None:
 
     Without this a power cut may take what was synced in them: no name leads there.
     """
-    missing = []
-    while not path.is_dir():
-        missing.append(path)
-        if path == path.parent:
-            break
-        path = path.parent
-    for each in reversed(missing):
-        each.mkdir(exist_ok=True)
-        sync_folder(each.parent)
+    if not path.is_dir():
+        if path != path.parent:
+            make_folder(path.parent)
+        path.mkdir(exist_ok=True)
+        sync_folder(path.parent)
 
 
 def sync_tree(folder: Path) -> None:
     """Wait until all files in a folder, and the folder itself, are on the disk; what a link leads to is not touched."""
     for place, _, names in os.walk(folder, topdown=False):
-        for name in names:
-            path = Path(place) / name
+        for path in (Path(place) / name for name in names):
             if path.is_file() and not path.is_symlink():
                 sync_file(path)
         sync_folder(Path(place))

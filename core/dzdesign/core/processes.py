@@ -17,7 +17,7 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from dzdesign.core.scratch import remove_scratch
+from dzdesign.core.placing import remove_scratch
 
 #: By which programs on Windows do not look for others in the working folder.
 NOT_HERE = "NoDefaultCurrentDirectoryInExePath"

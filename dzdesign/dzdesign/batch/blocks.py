@@ -7,8 +7,8 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.artefact_types import SourceFile, to_json_bytes
+from dzdesign.core.documents import sha256_of
 from dzdesign.design.firmware_manifest import BLOCK_FILE
 from dzdesign.report.lot.summary import DOES_NOT_HOLD, OK, Status
 

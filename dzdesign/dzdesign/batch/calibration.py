@@ -9,10 +9,11 @@ from threading import Lock
 from typing import TYPE_CHECKING, NamedTuple
 
 from dzdesign.batch.outputs import ForOutputs, WantedOutput, make_output, may_end_otherwise, reason_of_outputs
-from dzdesign.core.artefact_files import TOOL, sha256_of, write_folder
+from dzdesign.core.artefact_files import TOOL, write_folder
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile
+from dzdesign.core.documents import sha256_of
 from dzdesign.core.errors import DzdesignError, one_line
-from dzdesign.core.scratch import scratch_folder
+from dzdesign.core.placing import scratch_folder
 from dzdesign.design.design_choices import DesignChoices
 from dzdesign.design.firmware_manifest import Calibration
 from dzdesign.report.lot.summary import (

@@ -17,10 +17,10 @@ from dzdesign.batch.runners import run_local, run_on_cluster
 from dzdesign.batch.summary import SETTING_NAME, lot_setting_of, setting_summary, summary_of, units_of_lot
 from dzdesign.batch.valve_folders import ValveFolder, table_of_valves
 from dzdesign.batch.valves import Valve, valves_of
-from dzdesign.core.artefact_files import MANIFEST_NAME, read_bytes, write_file, write_files
+from dzdesign.core.artefact_files import MANIFEST_NAME, write_file, write_files
 from dzdesign.core.artefact_types import to_json_bytes
+from dzdesign.core.documents import read_bytes, read_recording
 from dzdesign.core.errors import InputError
-from dzdesign.core.input_files import read_recording
 from dzdesign.core.options import arguments_of, paths_of, read_options
 from dzdesign.design.design_choices import DEFAULTS, DesignChoices
 from dzdesign.design.firmware_manifest import form_named

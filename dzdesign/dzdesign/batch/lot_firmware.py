@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from dzdesign.batch.blocks import BLOCK_IMAGE
 from dzdesign.batch.valve_folders import ValveFolder
-from dzdesign.core.artefact_files import MANIFEST_NAME, read_bytes, sha256_of
+from dzdesign.core.artefact_files import MANIFEST_NAME
+from dzdesign.core.documents import read_bytes, sha256_of
 from dzdesign.design.firmware_manifest import BLOCK_FILE
 from dzdesign.report.lot.summary import FIRMWARE, LOT_SETTING, LotFirmware
 from dzdesign.report.lot.table import by_name

@@ -7,8 +7,9 @@ from pathlib import Path
 
 from dzdesign.batch.calibration import Outcome
 from dzdesign.batch.valve_folders import ValveFolder, read_valve_folder
-from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of, write_file, write_folder
+from dzdesign.core.artefact_files import MANIFEST_NAME, write_file, write_folder
 from dzdesign.core.artefact_types import THIS_TOOL, to_json_bytes
+from dzdesign.core.documents import sha256_of
 from dzdesign.core.errors import InputError
 from dzdesign.core.placing import make_folder
 from dzdesign.design.compensator import Compensator

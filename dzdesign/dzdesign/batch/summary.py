@@ -3,8 +3,9 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
+from dzdesign.core.artefact_files import MANIFEST_NAME
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
+from dzdesign.core.documents import sha256_of
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.recorded_units import RecordedUnits, common_units
 from dzdesign.core.worded import in_units

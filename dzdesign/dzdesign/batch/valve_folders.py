@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dzdesign.core.artefact_files import MANIFEST_NAME, read_bytes, sha256_of
+from dzdesign.core.artefact_files import MANIFEST_NAME
 from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.documents import read_bytes, sha256_of
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.identify.valve.model import SIDES

@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from dzdesign.core.artefact_files import read_bytes
+from dzdesign.core.documents import read_bytes
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.identify.valve.test_record import checked_record
 from dzdesign.report.lot.table import NAME, RECORD, by_name

@@ -5,10 +5,9 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
-from dzdesign.core.artefact_files import read_bytes
+from dzdesign.core.documents import read_bytes, read_toml
 from dzdesign.core.errors import InputError, nearest, quoted
 from dzdesign.core.options import MACHINE, Argument, flag_of
-from dzdesign.core.toml_documents import read_toml
 from dzdesign.terminal.progress import say
 
 #: Characters of a key to which the nearest known one is looked for.

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Annotated
 
 from dzdesign.core.artefact_files import check_file_may_be_written, write_file
+from dzdesign.core.documents import read_bytes
 from dzdesign.core.errors import InputError
-from dzdesign.core.input_files import read_bytes
 from dzdesign.core.options import AnyPath, Option, Texts, texts_of
 from dzdesign.terminal.progress import stage_progress
 

@@ -4,9 +4,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from dzdesign.codegen.project import generate
-from dzdesign.core.artefact_files import sha256_of, write_folder
+from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.artefact_types import to_json_bytes
-from dzdesign.core.scratch import scratch_folder
+from dzdesign.core.documents import sha256_of
+from dzdesign.core.placing import scratch_folder
 from dzdesign.derivation.account.published import DP0_MPA, FIRST, RAMP_S, RECORDS_HZ, U_MAX_V
 from dzdesign.design.designing import design
 from dzdesign.identify.identification import identify

@@ -5,7 +5,8 @@ from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from dzdesign.core.artefact_files import check_file_may_be_written, read_bytes, write_file
+from dzdesign.core.artefact_files import check_file_may_be_written, write_file
+from dzdesign.core.documents import read_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.core.options import AnyPath, Option, flag_of
 from dzdesign.design.design_choices import DEFAULTS, DesignChoices

@@ -4,7 +4,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dzdesign.core.artefact_files import read_bytes, sha256_of
+from dzdesign.core.documents import read_bytes, sha256_of
 from dzdesign.core.errors import InputError
 from dzdesign.core.options import AnyPath
 

@@ -5,7 +5,8 @@ from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from dzdesign.core.artefact_files import MANIFEST_NAME, parse_document, read_bytes, write_file, write_folder
+from dzdesign.core.artefact_files import MANIFEST_NAME, write_file, write_folder
+from dzdesign.core.documents import parse_document, read_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.core.options import AnyPath, Option
 

@@ -7,10 +7,11 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from dzdesign.core.artefact_files import check_folder_may_be_written, read_bytes, sha256_of, write_folder
+from dzdesign.core.artefact_files import check_folder_may_be_written, write_folder
+from dzdesign.core.documents import read_bytes, sha256_of
 from dzdesign.core.errors import InputError, quoted
 from dzdesign.core.options import CHECKS, AnyPath, Option, Paths, Texts, flag_of, paths_of, texts_of
-from dzdesign.core.scratch import scratch_folder
+from dzdesign.core.placing import scratch_folder
 from dzdesign.core.units import parse_quantity
 from dzdesign.stages.recordings import expand
 from dzdesign.terminal.progress import say, stage_progress

@@ -6,7 +6,7 @@ import os
 import re
 from typing import TYPE_CHECKING
 
-from dzdesign.core.folder_contents import MANIFEST_NAME
+from dzdesign.core.artefact_files import MANIFEST_NAME
 from dzdesign.core.units import chance
 from dzdesign.terminal.page import new_console, put_line, put_rows
 

@@ -11,7 +11,8 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from dzdesign.core.artefact_files import TOOL, read_bytes
+from dzdesign.core.artefact_files import TOOL
+from dzdesign.core.documents import read_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.core.strict_templates import strict_templates

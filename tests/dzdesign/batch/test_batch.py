@@ -23,8 +23,8 @@ from dzdesign.batch.command import useful_jobs
 from dzdesign.batch.results import Results
 from dzdesign.batch.runners import run_local
 from dzdesign.command_line.cli import main
-from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.documents import sha256_of
 from dzdesign.core.errors import InputError
 from dzdesign.core.placing import ABANDONED_S, UNPLACED
 from dzdesign.design.ceiling import DECIMALS

@@ -17,9 +17,9 @@ from dzdesign.codegen.calibration.block import built_for
 from dzdesign.codegen.calibration.packing import pack, read_block_file, text_of, unpack
 from dzdesign.codegen.project import block_core, generate
 from dzdesign.command_line.cli import main
-from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import SourceFile, to_json_bytes
+from dzdesign.core.documents import sha256_of
 from dzdesign.design.compensator import Compensator
 from dzdesign.report.lot.summary import LOT_SETTING
 from dzdesign.verify.exhaustive.block_check import BlockFirmware

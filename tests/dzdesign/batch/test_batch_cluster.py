@@ -21,8 +21,8 @@ from distributed.client import ClosedClientError
 from dzdesign.batch.calibration import Task
 from dzdesign.batch.runners import _check_workers, _scheduler_lost, run_on_cluster
 from dzdesign.command_line.cli import main
-from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.artefact_types import THIS_TOOL
+from dzdesign.core.documents import sha256_of
 from dzdesign.core.errors import InputError
 from dzdesign.design.design_choices import DesignChoices
 from dzdesign.stages.identify import IdentifyChoices

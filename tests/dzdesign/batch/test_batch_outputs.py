@@ -16,9 +16,10 @@ from dzdesign.batch.outputs import ForOutputs, WantedOutput, lot_outputs, make_o
 from dzdesign.batch.valve_folders import ValveFolder
 from dzdesign.codegen import other_targets
 from dzdesign.command_line.cli import main
-from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
+from dzdesign.core.artefact_files import MANIFEST_NAME
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import THIS_TOOL, to_json_bytes
+from dzdesign.core.documents import sha256_of
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.report.lot.folder import read_lot

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from dzdesign.batch.runners import _in_processes
+from dzdesign.core.documents import MOST_DOCUMENT, read_recording
 from dzdesign.core.errors import InputError
-from dzdesign.core.input_files import MOST_DOCUMENT, read_recording
 from dzdesign.core.processes import end_with
 from tests.support.many_valves import recordings
 
@@ -21,7 +21,7 @@ DZDESIGN = Path(sys.executable).with_name("dzdesign.exe" if sys.platform == "win
 CHILD = """
 import os, sys, time
 from dzdesign.core.processes import end_with
-from dzdesign.core.scratch import process_folder
+from dzdesign.core.placing import process_folder
 end_with(os.getppid())
 print(os.getpid(), process_folder(), flush=True)
 time.sleep(600)
@@ -93,6 +93,6 @@ def test_a_recording_larger_than_a_document_is_read(tmp_path, monkeypatch):
     with open(path, "wb") as file:
         file.truncate(MOST_DOCUMENT + 1)
     assert len(read_recording(path, "ramp file")) == MOST_DOCUMENT + 1
-    monkeypatch.setattr("dzdesign.core.input_files.MOST_RECORDING", 1000)
+    monkeypatch.setattr("dzdesign.core.documents.MOST_RECORDING", 1000)
     with pytest.raises(InputError, match="identify"):
         read_recording(path, "ramp file")

@@ -13,9 +13,10 @@ import pytest
 
 from dzdesign.codegen.project import generate
 from dzdesign.command_line.cli import main
-from dzdesign.core.artefact_files import sha256_of, write_folder
+from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import to_json_bytes
+from dzdesign.core.documents import sha256_of
 from dzdesign.derivation.account.published import RAMP_S, SIMULATION, VALVES
 from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions

@@ -12,8 +12,8 @@ import pytest
 
 from dzdesign.codegen.project import generate, target_named
 from dzdesign.command_line.cli import main
-from dzdesign.core.artefact_files import sha256_of, to_json
 from dzdesign.core.artefact_types import as_document, to_json_bytes
+from dzdesign.core.documents import sha256_of, to_json
 from dzdesign.core.errors import InputError
 from dzdesign.design.certificate import reach_of_certificate
 from dzdesign.design.designing import design

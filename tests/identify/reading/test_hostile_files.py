@@ -18,9 +18,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from dzdesign.command_line.cli import main
-from dzdesign.core import input_files
-from dzdesign.core.artefact_files import parse_document, read_bytes, write_file
+from dzdesign.core.artefact_files import write_file
 from dzdesign.core.artefact_types import as_document
+from dzdesign.core.documents import parse_document, read_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.core.units import SI_UNIT, parse_quantity, si_factor
 from dzdesign.design.compensator import Compensator
@@ -186,7 +186,7 @@ def test_a_recording_through_a_pipe(name):
 
 @needs_pipes
 def test_a_pipe_without_an_end(monkeypatch):
-    monkeypatch.setattr(input_files, "MOST_PIPED", 1 << 22)
+    monkeypatch.setattr("dzdesign.core.documents.MOST_PIPED", 1 << 22)
     pipe, writer = poured(itertools.repeat(b"1,2,3,4\n" * 10_000))
     assert "is a pipe with more than 4 MiB" in outcome(read_ramp_file, pipe)
     os.close(int(pipe.name))

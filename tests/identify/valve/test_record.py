@@ -9,9 +9,9 @@ import pytest
 from dzdesign import api
 from dzdesign.command_line.cli import main
 from dzdesign.command_line.invocation import merged_entries
-from dzdesign.core.artefact_files import sha256_of, to_json
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import as_document, to_json_bytes
+from dzdesign.core.documents import sha256_of, to_json
 from dzdesign.core.errors import InputError
 from dzdesign.identify.identification import identify
 from dzdesign.identify.valve.model import ValveModel

@@ -10,9 +10,10 @@ import pytest
 from dzdesign.codegen.project import generate, target_named
 from dzdesign.codegen.writing import write_generated
 from dzdesign.command_line.cli import main
-from dzdesign.core.artefact_files import to_json, write_folder
+from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import to_json_bytes
+from dzdesign.core.documents import to_json
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.compensator import Compensator

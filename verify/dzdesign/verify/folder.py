@@ -12,14 +12,12 @@ from functools import lru_cache
 from itertools import zip_longest
 from pathlib import Path, PurePosixPath
 
-from dzdesign.core.artefact_files import MANIFEST_NAME, check_inside, read_bytes
+from dzdesign.core.artefact_files import MANIFEST_NAME, check_inside, digest_of, manifest_of
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import schema_of
-from dzdesign.core.documents import family_of
+from dzdesign.core.documents import MOST_RECORDING, family_of, read_bytes, reason_of
 from dzdesign.core.errors import InputError, and_more, quoted
-from dzdesign.core.folder_contents import digest_of, manifest_of
-from dzdesign.core.input_files import MOST_RECORDING, reason_of
-from dzdesign.core.scratch import scratch_folder
+from dzdesign.core.placing import scratch_folder
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest, OutputManifest
 from dzdesign.verify.requirements import REPRODUCED, Check

@@ -8,8 +8,9 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
+from dzdesign.core.artefact_files import MANIFEST_NAME
 from dzdesign.core.artefact_types import THIS_TOOL, Artefact, SourceFile, as_document, schema_of, to_json_bytes
+from dzdesign.core.documents import sha256_of
 from dzdesign.core.errors import RequirementError
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.core.verdicts import NOT_ASKED_FOR, NOT_CHECKED

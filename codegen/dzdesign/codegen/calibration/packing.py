@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from dzdesign.codegen.calibration.layout import INNER, LAYOUT, LENGTH_WORDS, MAGIC, CalibrationBlock, entries, members
+from dzdesign.core.documents import read_bytes
 from dzdesign.core.errors import DzdesignError, InputError, nearest
-from dzdesign.core.input_files import read_bytes
 
 OCTETS = 2 * LENGTH_WORDS
 CRC_OCTETS = 4

@@ -20,10 +20,10 @@ from dzdesign.codegen.telemetry.frame import (
     FrameReader,
     Link,
 )
-from dzdesign.core.artefact_files import MANIFEST_NAME, TOOL, note_written, read_bytes, sha256_of
+from dzdesign.core.artefact_files import MANIFEST_NAME, TOOL, note_written
 from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.documents import read_bytes, reason_of, sha256_of
 from dzdesign.core.errors import InputError
-from dzdesign.core.input_files import reason_of
 from dzdesign.core.placing import sync_folder
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest

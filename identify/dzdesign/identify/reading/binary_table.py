@@ -26,8 +26,8 @@ from typing import TYPE_CHECKING, BinaryIO, final
 import numpy as np
 
 from dzdesign.core.errors import InputError
+from dzdesign.core.placing import scratch_folder
 from dzdesign.core.processes import end_with, interrupts_kept_waiting, safe_path
-from dzdesign.core.scratch import scratch_folder
 from dzdesign.identify.reading import formats
 from dzdesign.identify.reading.formats.file_format import NO_NUMBERS_UNIT, NUMBER_KINDS, FileColumn, FileFormat
 from dzdesign.identify.reading.table import QUOTED_CHARACTERS, Table, numbered, unreadable

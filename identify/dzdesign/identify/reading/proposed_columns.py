@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dzdesign.core.artefact_files import open_bytes
+from dzdesign.core.documents import open_bytes
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.units import measures
 from dzdesign.identify.reading.clock import ClockColumns, is_milliseconds

@@ -14,7 +14,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from dzdesign.core.artefact_files import open_bytes, sha256_of_file
+from dzdesign.core.documents import open_bytes, sha256_of_file
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import Quantity, Unit
 from dzdesign.identify.reading.binary_table import LONGEST_MARK, format_of, read_binary_table

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dzdesign.core.artefact_files import MANIFEST_NAME, parse_document, read_bytes, sha256_of
+from dzdesign.core.artefact_files import MANIFEST_NAME, digest_of
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import schema_of
+from dzdesign.core.documents import parse_document, read_bytes, sha256_of
 from dzdesign.core.errors import InputError, and_more
-from dzdesign.core.folder_contents import digest_of
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.report.artefacts import change_in
 from dzdesign.report.lot.summary import AGAIN, OK, SUMMARY_NAME, VALVES, LotSummary, UnfinishedLot, ValveManifest

@@ -6,8 +6,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dzdesign.core.artefact_files import MANIFEST_NAME, read_bytes
+from dzdesign.core.artefact_files import MANIFEST_NAME
 from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.documents import read_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.identify.valve.model import SIDES
 from dzdesign.report.lot.summary import AGAIN, ValveManifest

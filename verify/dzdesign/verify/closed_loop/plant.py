@@ -20,10 +20,9 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, cast
 import numpy as np
 from msgspec import Meta
 
-from dzdesign.core.artefact_files import read_bytes
 from dzdesign.core.artefact_types import quantity
+from dzdesign.core.documents import read_bytes, read_toml
 from dzdesign.core.errors import InputError, nearest, quoted
-from dzdesign.core.toml_documents import read_toml
 
 if TYPE_CHECKING:
     import casadi

@@ -9,9 +9,10 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from msgspec import Meta
 
-from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
+from dzdesign.core.artefact_files import MANIFEST_NAME
 from dzdesign.core.artefact_types import THIS_TOOL, Artefact, SourceFile, quantity
 from dzdesign.core.dither import Dither
+from dzdesign.core.documents import sha256_of
 from dzdesign.core.errors import InputError
 from dzdesign.design.signals import Signals
 from dzdesign.identify.reading.ramp_files import SIMULATED_MARK, ramp_file_bytes

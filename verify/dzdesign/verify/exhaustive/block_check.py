@@ -15,8 +15,8 @@ from zlib import crc32
 import numpy as np
 from msgspec import Meta
 
-from dzdesign.core.artefact_files import read_bytes, sha256_of
 from dzdesign.core.artefact_types import THIS_TOOL, Artefact, Sha256, SourceFile
+from dzdesign.core.documents import read_bytes, sha256_of
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import BLOCK_FILE, FirmwareManifest

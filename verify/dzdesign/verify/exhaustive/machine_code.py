@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from dzdesign.core.artefact_files import MANIFEST_NAME
 from dzdesign.core.errors import RequirementError
-from dzdesign.core.folder_contents import MANIFEST_NAME
 from dzdesign.verify.current.current_checks import controller_on_machine
 from dzdesign.verify.evidence import InputCheck
 from dzdesign.verify.exhaustive.exact_law import ExactLaw

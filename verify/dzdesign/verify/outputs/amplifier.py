@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 
-from dzdesign.core.artefact_files import read_bytes
+from dzdesign.core.documents import read_bytes
 from dzdesign.core.errors import InputError, quoted
 from dzdesign.core.option_readers import percent
 from dzdesign.design.compensator import Compensator

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from dzdesign.core.errors import InputError, RequirementError, and_more
-from dzdesign.core.scratch import scratch_folder
+from dzdesign.core.placing import scratch_folder
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import OutputManifest
 from dzdesign.design.signals import SIDE_NAMES

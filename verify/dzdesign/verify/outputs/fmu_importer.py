@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dzdesign.core.errors import RequirementError
-from dzdesign.core.scratch import scratch_folder
+from dzdesign.core.placing import scratch_folder
 from dzdesign.verify.toolchain.machines import run_child
 
 if TYPE_CHECKING:

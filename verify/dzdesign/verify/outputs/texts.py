@@ -19,10 +19,10 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from dzdesign.core.artefact_files import read_bytes
+from dzdesign.core.documents import read_bytes
 from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.core.placing import scratch_folder
 from dzdesign.core.processes import find_program, run_program
-from dzdesign.core.scratch import scratch_folder
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import OutputManifest
 from dzdesign.verify.evidence import OutputChecks, TriedInputs

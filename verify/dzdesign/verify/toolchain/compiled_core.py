@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dzdesign.core.artefact_files import sha256_of, sha256_of_octets
+from dzdesign.core.documents import sha256_of, sha256_of_octets
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.verify.evidence import InputCounts
 from dzdesign.verify.toolchain.compiled_library import CompiledLibrary, Function

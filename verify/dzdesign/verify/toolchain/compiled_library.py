@@ -120,7 +120,7 @@ class CompiledLibrary:
         return 0
 
     def _started(self) -> "subprocess.Popen[bytes]":
-        """Start the child process, and have it end with this object; without dzdesign it reads no further call, and ends."""
+        """Start the child process, and have it end with this object; with dzdesign it ends by itself."""
         with contextlib.ExitStack() as stack:
             self._errors = stack.enter_context(tempfile.TemporaryFile())
             process = subprocess.Popen(

@@ -15,10 +15,10 @@ from threading import Lock
 
 import platformdirs
 
-from dzdesign.core.artefact_files import sha256_of_octets
+from dzdesign.core.documents import sha256_of_octets
 from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.core.placing import process_folder
 from dzdesign.core.processes import find_program, run_program
-from dzdesign.core.scratch import process_folder
 
 #: What the generated core must bear without a word.
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wpedantic", "-Werror")
