@@ -11,7 +11,7 @@ from typing import Any, get_type_hints
 from dzdesign.codegen.calibration.layout import SHAPE_BITS, Member, members
 from dzdesign.command_line.command_table import COMMANDS
 from dzdesign.command_line.parser import arguments_of_command, command_module, usage_of
-from dzdesign.core.artefact_schema import json_schema
+from dzdesign.core.artefact_reading import json_schema
 from dzdesign.core.options import field_docstrings
 from dzdesign.identify.data_quality.catalogue import catalogue
 

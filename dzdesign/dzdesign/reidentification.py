@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from dzdesign.core.artefact_reading import differences
 from dzdesign.core.artefact_types import THIS_TOOL
 from dzdesign.core.documents import read_bytes, sha256_of
 from dzdesign.core.errors import InputError, and_more, one_line, quoted
 from dzdesign.core.options import Paths
-from dzdesign.core.value_differences import differences
 from dzdesign.stages.identify import IdentifyArguments, identify_again, read_again, stated_options
 from dzdesign.stages.recordings import expand
 

@@ -16,8 +16,7 @@ from jsonschema import Draft202012Validator
 from msgspec import Meta
 
 from dzdesign.core.artefact_files import write_files
-from dzdesign.core.artefact_reading import read_artefact
-from dzdesign.core.artefact_schema import LARGEST_INTEGER, json_schema
+from dzdesign.core.artefact_reading import LARGEST_INTEGER, json_schema, read_artefact
 from dzdesign.core.artefact_types import (
     THIS_TOOL,
     Artefact,

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from dzdesign.core.value_differences import Difference, differences
+from dzdesign.core.artefact_reading import NOTHING, Difference, differences
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ def places(*values, **options):
         (Measured(1.0), Measured(1.1), "dp_MPa"),
         (Measured(1.0, (1.0, 2.0)), Measured(1.0, (1.0, 3.0)), "rows[1]"),
         (Measured(1.0, (1.0,)), Measured(1.0, (1.0, 2.0)), "rows"),
-        ({"a": {"b": 1}}, {"a": {}}, ".a.b"),
+        ({"a": {"b": 1}}, {"a": {}}, "a.b"),
         ([1, "ab"], [1, "ac"], "[1]"),
         (True, 1.5, ""),
         (None, 0.0, ""),
@@ -41,7 +41,7 @@ def test_rounding_is_of_floats_only_and_no_wider_than_given():
     assert places(1_000_000_000, 1_000_000_001, rounding=1e-6) == [""]
 
 
-def test_a_key_that_one_lacks_is_none_there():
+def test_a_key_that_one_lacks_is_nothing_there():
     assert list(differences({"a": 1}, {"b": 2})) == [
-        Difference(place=".b", stated=None, follows=2), Difference(place=".a", stated=1, follows=None),
+        Difference(place="b", stated=NOTHING, follows=2), Difference(place="a", stated=1, follows=NOTHING),
     ]  # fmt: skip

@@ -10,8 +10,8 @@ from fractions import Fraction
 
 import numpy as np
 
+from dzdesign.core.artefact_reading import differences
 from dzdesign.core.errors import InputError, RequirementError, quoted
-from dzdesign.core.value_differences import differences
 from dzdesign.core.worded import errors_in
 from dzdesign.design.certificate import with_certificates
 from dzdesign.design.compensator import Compensator
