@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from dzdesign.assess.flow_curves import PressureCurves, read_curves
 from dzdesign.assess.options import BOTH_SIDES, SETS, AssessOptions, Set, Side
 from dzdesign.core.errors import InputError
-from dzdesign.core.recorded_units import RecordedUnits
-from dzdesign.core.worded import Worded, all_of, in_units, worded
+from dzdesign.core.recorded_units import RecordedUnits, shown_in, worded
 from dzdesign.identify.constants import MPA
 from dzdesign.identify.knees.meter_lag import MeterLag, find_lag
 from dzdesign.identify.knees.prepared_tests import found_floor, split_recordings
@@ -73,10 +72,8 @@ def compare_curves(before: Sequence[RampTest], after: Sequence[RampTest], option
         if not tests:
             which = "without" if name == "before" else "with"
             raise InputError(f"no recordings {which} the compensator were given; expected at least one file")
-    try:
+    with shown_in(units_of([*before, *after])):
         return _compared(sets, options)
-    except InputError as error:
-        raise InputError(in_units(error, units_of([*before, *after]))) from error
 
 
 def _compared(sets: Mapping[Set, Sequence[RampTest]], options: AssessOptions) -> Comparison:
@@ -155,14 +152,14 @@ def relative_distance(one: float | None, other: float | None) -> float:
     return abs(one - other) / max(one, other)
 
 
-def _no_pressure_in_common(pairs: Sequence[CurvePair]) -> Worded:
-    def listed(name: Set) -> Worded:
+def _no_pressure_in_common(pairs: Sequence[CurvePair]) -> str:
+    def listed(name: Set) -> str:
         found = [(pair.side, pair.sets[name].dp) for pair in pairs if name in pair.sets]
         places = [
             worded("{side} unknown" if dp is None else "{side} {dp:.2f MPa}", side=side, dp=(dp or 0.0) / MPA)
             for side, dp in found
         ]
-        return all_of(places, ", ") if places else worded("none")
+        return ", ".join(places) or "none"
 
     return worded(
         "the recordings without the compensator ({before}) and with it ({after}) have no pressure drop in common "

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.core.worded import worded
+from dzdesign.core.recorded_units import worded
 from dzdesign.identify.constants import MPA
 from dzdesign.identify.knees.gated_line import GATE, GatedLine, PreparedBranch, prepare_branch
 from dzdesign.identify.knees.linear_region import USEFUL_FLOW, find_straight_parts
@@ -116,7 +116,7 @@ def read_curves(
     for item in pooled:
         if item.branches == (None, None):
             u, dp = item.test.u, nominal_dp(item.test)
-            at = worded("an unknown pressure drop") if dp is None else worded("{dp:.3g MPa}", dp=dp / MPA)
+            at = "an unknown pressure drop" if dp is None else worded("{dp:.3g MPa}", dp=dp / MPA)
             raise InputError(
                 worded(
                     "'{source}' has no ramp from near zero up at {at}: the command runs from {low:.2f #V} to "

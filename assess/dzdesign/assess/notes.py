@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from dzdesign.assess.assessment import PressureAssessment
 from dzdesign.assess.curve_pairs import Comparison, CurvePair
 from dzdesign.assess.options import SETS, Set
-from dzdesign.core.recorded_units import RecordedUnits
+from dzdesign.core.recorded_units import RecordedUnits, shown_in
 from dzdesign.identify.constants import L_MIN, MPA
 from dzdesign.identify.data_quality.flow_meter import LIKELY_LAG
 from dzdesign.identify.data_quality.recordings import about_recordings
@@ -25,7 +25,8 @@ def find_notes(comparison: Comparison, pressures: Sequence[PressureAssessment]) 
     """Return the notes of an assessment; `pressures` is what was read of each pair of the comparison."""
     pairs = comparison.pairs
     tests = [test for tests in comparison.tests.values() for test in tests]
-    found = [item.in_units(comparison.units) for item in about_recordings(tests)]
+    with shown_in(comparison.units):
+        found = about_recordings(tests)
     notes = [*found, *_about_partners(comparison), *_about_the_meter(comparison)]
     both = list(zip(pairs, pressures, strict=True))
     notes += [note for pair, item in both for note in _about_zero(pair, item, comparison.units)]

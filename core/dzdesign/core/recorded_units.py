@@ -3,14 +3,17 @@
 They are those of the recordings.
 
 A number in a text is written with a format and the unit in which it is computed, as in ``{knee:.3f V}``.
-`RecordedUnits` turns it into the unit of the recordings, and the decimals into those of the same significance.
-`dzdesign.core.worded` does so for whole texts.
+`RecordedUnits` turns it into the unit of the recordings, and the decimals into those of the same significance;
+`worded` does so for whole texts, in the units that `shown_in` has set once the recordings were read.
 """
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, replace
+from string import Formatter
 from typing import TYPE_CHECKING, Annotated, Any, Literal, final, overload
 
 from msgspec import UNSET, Meta, UnsetType
@@ -23,7 +26,7 @@ if TYPE_CHECKING:
 
 #: Characters of a unit: of a bare number, such as a duty cycle, it is the label of its column.
 LONGEST_UNIT = 40
-UnitName = Annotated[str, Meta(min_length=1, max_length=LONGEST_UNIT)]
+UnitName = Annotated[str, Meta(description="Name of the unit.", min_length=1, max_length=LONGEST_UNIT)]
 
 
 @final
@@ -31,15 +34,13 @@ UnitName = Annotated[str, Meta(min_length=1, max_length=LONGEST_UNIT)]
 class CommandUnit:
     """Unit of the command: a reading is ``at_zero + factor * u`` at a command of u volts."""
 
-    unit: Annotated[UnitName, Meta(description="Name of the unit.")] = "V"
-    at_zero: Annotated[
-        float, quantity("1", "Reading at a command of 0 V, such as 12 for 4..20 mA.", ge=-1e12, le=1e12)
-    ] = 0.0
-    factor: Annotated[float, quantity("1/V", "Change of the reading per volt of command.", ge=-1e12, le=1e12)] = 1.0
-    declared: Annotated[
-        str,
-        Meta(description="Declared range, such as '4..20 mA = -10..10 V'; empty if none was declared.", max_length=120),
-    ] = ""
+    unit: UnitName = "V"
+    at_zero: Annotated[float, quantity("1", ge=-1e12, le=1e12)] = 0.0
+    """Reading at a command of 0 V, such as 12 for 4..20 mA."""
+    factor: Annotated[float, quantity("1/V", ge=-1e12, le=1e12)] = 1.0
+    """Change of the reading per volt of command."""
+    declared: Annotated[str, Meta(max_length=120)] = ""
+    """Declared range, such as '4..20 mA = -10..10 V'; empty if none was declared."""
 
     def __post_init__(self) -> None:
         if self.factor == 0:
@@ -51,7 +52,7 @@ class CommandUnit:
 class PressureUnit:
     """Unit of the pressure drop."""
 
-    unit: Annotated[UnitName, Meta(description="Name of the unit.")] = "MPa"
+    unit: UnitName = "MPa"
     factor: Annotated[float, quantity("1/MPa", "Number of these units in 1 MPa.", gt=0, le=1e12)] = 1.0
 
 
@@ -60,7 +61,7 @@ class PressureUnit:
 class FlowUnit:
     """Unit of the flow."""
 
-    unit: Annotated[UnitName, Meta(description="Name of the unit.")] = "L/min"
+    unit: UnitName = "L/min"
     factor: Annotated[float, quantity("min/L", "Number of these units in 1 L/min.", gt=0, le=1e12)] = 1.0
 
 
@@ -69,7 +70,7 @@ class FlowUnit:
 class CurrentUnit:
     """Unit of a solenoid's current."""
 
-    unit: Annotated[UnitName, Meta(description="Name of the unit.")] = "A"
+    unit: UnitName = "A"
     factor: Annotated[float, quantity("1/A", "Number of these units in 1 A.", gt=0, le=1e12)] = 1.0
 
 
@@ -81,11 +82,9 @@ Unit = CommandUnit | PressureUnit | FlowUnit
 class _Kind:
     """A unit in which something is computed: powers of command, pressure, flow and current in it, and how it is named.
 
-    `name` is how it is named where its quantities are in V, MPa, L/min and A, `label` elsewhere; `scale` brings it to
-    them.
+    `label` is how it is named where its quantities are not in V, MPa, L/min and A; `scale` brings it to them.
     """
 
-    name: str
     label: str
     u: int = 0
     dp: int = 0
@@ -98,18 +97,18 @@ class _Kind:
 
 #: Units that stand in formats. A difference of two commands is in ``mV``, or in ``dV`` where it is printed in V.
 _KINDS = {
-    "V": _Kind("V", "{u}", u=1, reading=True),
-    "dV": _Kind("V", "{u}", u=1),
-    "mV": _Kind("mV", "{u}", u=1, scale=1e-3),
-    "V/s": _Kind("V/s", "{u}/s", u=1),
-    "V/mm": _Kind("V/mm", "{u}/mm", u=1),
-    "MPa": _Kind("MPa", "{dp}", dp=1),
-    "L/min": _Kind("L/min", "{q}", q=1),
-    "L/min/V": _Kind("L/min/V", "{q}/{u}", u=-1, q=1),
-    "L/min a volt": _Kind("L/min a volt", "{q} per {u}", u=-1, q=1),
-    "mV/MPa²": _Kind("mV/MPa²", "{u}/{dp}²", u=1, dp=-2, scale=1e-3),
-    "L/min per MPa": _Kind("L/min per MPa", "{q} per {dp}", dp=-1, q=1),
-    "A": _Kind("A", "{i}", i=1),
+    "V": _Kind("{u}", u=1, reading=True),
+    "dV": _Kind("{u}", u=1),
+    "mV": _Kind("{u}", u=1, scale=1e-3),
+    "V/s": _Kind("{u}/s", u=1),
+    "V/mm": _Kind("{u}/mm", u=1),
+    "MPa": _Kind("{dp}", dp=1),
+    "L/min": _Kind("{q}", q=1),
+    "L/min/V": _Kind("{q}/{u}", u=-1, q=1),
+    "L/min a volt": _Kind("{q} per {u}", u=-1, q=1),
+    "mV/MPa²": _Kind("{u}/{dp}²", u=1, dp=-2, scale=1e-3),
+    "L/min per MPa": _Kind("{q} per {dp}", dp=-1, q=1),
+    "A": _Kind("{i}", i=1),
 }
 _FORMAT = re.compile(r"(?P<sign>\+?)(?:\.(?P<digits>\d+))?(?P<kind>[fg])")
 
@@ -118,18 +117,16 @@ _FORMAT = re.compile(r"(?P<sign>\+?)(?:\.(?P<digits>\d+))?(?P<kind>[fg])")
 class RecordedUnits:
     """Units in which a valve is shown; the numbers of an artefact are in V, MPa, L/min and A whatever these are."""
 
-    command: Annotated[CommandUnit, Meta(description="Unit of the command.")] = CommandUnit()
-    pressure: Annotated[PressureUnit, Meta(description="Unit of the pressure drop.")] = PressureUnit()
-    flow: Annotated[FlowUnit, Meta(description="Unit of the flow.")] = FlowUnit()
-    current: Annotated[
-        CurrentUnit | UnsetType, Meta(description="Unit of a solenoid's current; A if the key is absent.")
-    ] = UNSET
-    differ: Annotated[
-        tuple[Quantity, ...],
-        Meta(
-            description="Quantities whose units differ between the recordings. They are displayed in V, MPa or L/min."
-        ),
-    ] = ()
+    command: CommandUnit = CommandUnit()
+    """Unit of the command."""
+    pressure: PressureUnit = PressureUnit()
+    """Unit of the pressure drop."""
+    flow: FlowUnit = FlowUnit()
+    """Unit of the flow."""
+    current: CurrentUnit | UnsetType = UNSET
+    """Unit of a solenoid's current; A if the key is absent."""
+    differ: tuple[Quantity, ...] = ()
+    """Quantities whose units differ between the recordings. They are displayed in V, MPa or L/min."""
 
     def of_side(self, side: str) -> "RecordedUnits":
         """Return the units in which a side's commands were recorded, which are counted from zero in valve.json.
@@ -190,10 +187,8 @@ class RecordedUnits:
         """Return the name of the unit that stands for one in which something is computed, for a header or an axis."""
         kind = _KINDS[unit]
         if self._as_computed(kind):
-            return kind.name
-        return kind.label.format(
-            u=self.command.unit, dp=self.pressure.unit, q=self.flow.unit, i=self._current.unit
-        )
+            return "V" if unit == "dV" else unit
+        return kind.label.format(u=self.command.unit, dp=self.pressure.unit, q=self.flow.unit, i=self._current.unit)
 
     @overload
     def convert(self, value: float, unit: str) -> float: ...
@@ -259,6 +254,50 @@ def _without_exponent(value: float, spec: str) -> str:
 
 #: V, MPa and L/min.
 AS_COMPUTED = RecordedUnits()
+_SHOWN: ContextVar[RecordedUnits] = ContextVar("units in which texts are worded", default=AS_COMPUTED)
+
+
+@contextmanager
+def shown_in(units: RecordedUnits) -> Iterator[None]:
+    """Word the texts of a block in units: who words a warning or a refusal need not know those of the recordings."""
+    before = _SHOWN.set(units)
+    try:
+        yield
+    finally:
+        _SHOWN.reset(before)
+
+
+class _Filler(Formatter):
+    """Fills the places of a text with quantities, or anything else."""
+
+    def format_field(self, value: Any, format_spec: str) -> str:
+        """Write a number; of a quantity, in the unit of the recordings."""
+        spec, blank, unit = format_spec.partition(" ")
+        if not blank:
+            return format(value, spec)
+        if unit.startswith("#"):  # without its unit, which another number of the sentence has
+            return _SHOWN.get().number(value, f"{spec} {unit[1:]}")
+        return _SHOWN.get().text(value, format_spec)
+
+
+def worded(template: str, /, **numbers: object) -> str:
+    """Return a text with quantities, in the units of `shown_in`; ``{low:.2f #V}`` leaves the unit out.
+
+    Examples
+    --------
+    >>> with shown_in(RecordedUnits(command=CommandUnit(unit="mA", at_zero=4.0, factor=1.6))):
+    ...     worded("it opens at {knee:.2f V}", knee=5.2)
+    'it opens at 12.32 mA'
+    """
+    return _Filler().vformat(template, (), numbers)
+
+
+Worded = str
+
+
+def all_of(texts: Sequence[str], between: str = " and ") -> str:
+    """Return several texts as one."""
+    return between.join(texts)
 
 
 #: Spellings of a unit the name of which is another.

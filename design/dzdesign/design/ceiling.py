@@ -18,7 +18,7 @@ from math import ceil, floor, lcm
 from typing import NamedTuple
 
 from dzdesign.core.errors import InputError, RequirementError
-from dzdesign.core.worded import worded
+from dzdesign.core.recorded_units import worded
 from dzdesign.design.design_choices import Above
 from dzdesign.design.exact_row import ExactRow
 from dzdesign.design.machine import Allowance, Machine

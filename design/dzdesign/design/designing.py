@@ -17,7 +17,7 @@ import numpy as np
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
 from dzdesign.core.documents import sha256_of
 from dzdesign.core.errors import InputError
-from dzdesign.core.worded import errors_in
+from dzdesign.core.recorded_units import shown_in
 from dzdesign.derivation.law import Law, law
 from dzdesign.derivation.laws import LAW_NAMES
 from dzdesign.derivation.presentation.formulas import to_text
@@ -61,7 +61,7 @@ def design(valve: ValveModel, options: DesignOptions | None = None) -> Compensat
     RequirementError
         If a proof fails.
     """
-    with errors_in(valve.recorded_units):
+    with shown_in(valve.recorded_units):
         return _designed(valve, options or DesignOptions())
 
 

@@ -12,7 +12,7 @@ from fractions import Fraction
 from itertools import pairwise
 
 from dzdesign.core.errors import InputError
-from dzdesign.core.worded import worded
+from dzdesign.core.recorded_units import worded
 from dzdesign.design.ceiling import lowest_places
 from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.compensator import Compensator

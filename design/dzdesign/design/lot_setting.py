@@ -16,7 +16,7 @@ from math import ceil, floor
 import numpy as np
 
 from dzdesign.core.errors import InputError, RequirementError, and_more
-from dzdesign.core.worded import worded
+from dzdesign.core.recorded_units import worded
 from dzdesign.design.beta_table import between_nodes, choose_beta_table
 from dzdesign.design.ceiling import OffsetCeiling, OffsetCurve, at_codes, lowest_places, offset_ceiling
 from dzdesign.design.certificate import guarded_curve, with_certificates

@@ -12,7 +12,7 @@ import numpy as np
 
 from dzdesign.core.artefact_reading import differences
 from dzdesign.core.errors import InputError, RequirementError, quoted
-from dzdesign.core.worded import errors_in
+from dzdesign.core.recorded_units import shown_in
 from dzdesign.design.certificate import with_certificates
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs_at_tests import (
@@ -65,7 +65,7 @@ def prove_derived(compensator: Compensator) -> None:
         raise InputError(f"its valve can't be designed with its options: {error}; {Compensator.REMEDY}") from error
     if compensator.lot:
         try:
-            with errors_in(compensator.valve.recorded_units):
+            with shown_in(compensator.valve.recorded_units):
                 sides = with_certificates(compensator).sides
                 prove_lot(compensator)
         except RequirementError as error:

@@ -6,7 +6,7 @@ from functools import partial
 from math import gcd
 
 from dzdesign.core.errors import InputError
-from dzdesign.core.worded import worded
+from dzdesign.core.recorded_units import worded
 from dzdesign.design.beta_table import STEP_CODES, choose_beta_table, released_from
 from dzdesign.design.ceiling import OffsetCeiling, OffsetCurve, offset_row
 from dzdesign.design.certificate import GuardedSide, hold_below

@@ -7,8 +7,7 @@ from dzdesign.core.artefact_files import MANIFEST_NAME
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
 from dzdesign.core.documents import sha256_of
 from dzdesign.core.errors import InputError, RequirementError
-from dzdesign.core.recorded_units import RecordedUnits, common_units
-from dzdesign.core.worded import in_units
+from dzdesign.core.recorded_units import RecordedUnits, common_units, shown_in
 from dzdesign.design.compensator import Compensator
 from dzdesign.report.lot.spread import spreads_of
 from dzdesign.report.lot.summary import (
@@ -34,9 +33,10 @@ def lot_setting_of(designed: "Mapping[str, Compensator]") -> "tuple[LotSetting |
     from dzdesign.design.lot_setting import lot_setting
 
     try:
-        return lot_setting(designed), None
+        with shown_in(units_of_lot(designed)):
+            return lot_setting(designed), None
     except (InputError, RequirementError) as error:
-        return None, in_units(error, units_of_lot(designed))
+        return None, str(error)
 
 
 def summary_of(

@@ -8,8 +8,7 @@ from msgspec import UNSET
 from dzdesign.core.artefact_reading import rounded
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, own_result
 from dzdesign.core.errors import InputError
-from dzdesign.core.recorded_units import RecordedUnits
-from dzdesign.core.worded import in_units
+from dzdesign.core.recorded_units import RecordedUnits, shown_in
 from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.data_quality.catalogue import most_serious_first, warn
 from dzdesign.identify.data_quality.clipped_meter import without_clipping
@@ -75,6 +74,17 @@ def identify_sides(
     if not tests:
         raise InputError("no ramp tests were given; expected at least one file")
     units = units_of(tests)
+    with shown_in(units):
+        return _identified(tests, options, units, record or {}, low_flow)
+
+
+def _identified(
+    tests: Sequence[RampTest],
+    options: IdentifyOptions,
+    units: RecordedUnits,
+    record: Mapping[str, str],
+    low_flow: Sequence[LowFlow],
+) -> Identification:
     dither = options.dithered.of(units, options.u_max) if options.dithered else None
     tests = [without_dither(test, dither, options.u_max) for test in tests]
     sides, warnings = _each_side(tests, options, units, low_flow)
@@ -100,13 +110,14 @@ def identify_sides(
         sides={name: side.model for name, side in sides.items()},
         warnings=most_serious_first(
             (
-                *(item.in_units(units) for item in (*about_recordings(tests), *about_rest(tests, options.u_max))),
-                *([warn("two-sides").in_units(units)] if len(sides) > 1 else []),
-                *(item.in_units(units) for item in about_whole_meter(zeros, tests, options.u_max)),
+                *about_recordings(tests),
+                *about_rest(tests, options.u_max),
+                *([warn("two-sides")] if len(sides) > 1 else []),
+                *about_whole_meter(zeros, tests, options.u_max),
                 *warnings,
             )
         ),
-        record=dict(record or {}),
+        record=dict(record),
         dithered=dither or UNSET,
     )
     # Rounded as they are, factors of a small unit would lose their digits.
@@ -129,24 +140,23 @@ def _each_side(
             if by_hand:
                 raise InputError(f"{by_hand[0].source} is of {name} commands, but no ramp test is; record one")
             continue
-        in_side = units.of_side(name)
-        mixed = about_mixed_pressures(of_side)
-        pressures = (*mixed, *about_single_pressures(of_side, mixed))
-        # At the end of its range a meter stands still as one that is stuck does.
-        of_side, side_options, clipped = without_clipping(of_side, options)
-        of_side, dropped = without_drop_outs(of_side)
-        try:
-            sides[name] = identify_side(of_side, side_options, in_side, by_hand)
-        except InputError as error:
-            # Ramps of several pressures taken for one test may be refused for any reason: the cause is this.
-            cause = f"; it may be that {in_units(mixed[0].text, in_side)}" if mixed else ""
-            reason = in_units(error, in_side) + cause
-            if not sides:
-                raise InputError(reason) from error
-            refused.append(warn("side-refused", side=name, reason=reason).in_units(in_side))
-            continue
+        with shown_in(units.of_side(name)):
+            mixed = about_mixed_pressures(of_side)
+            pressures = (*mixed, *about_single_pressures(of_side, mixed))
+            # At the end of its range a meter stands still as one that is stuck does.
+            of_side, side_options, clipped = without_clipping(of_side, options)
+            of_side, dropped = without_drop_outs(of_side)
+            try:
+                sides[name] = identify_side(of_side, side_options, units.of_side(name), by_hand)
+            except InputError as error:
+                # Ramps of several pressures taken for one test may be refused for any reason: the cause is this.
+                reason = f"{error}; it may be that {mixed[0].text}" if mixed else str(error)
+                if not sides:
+                    raise InputError(reason) from error
+                refused.append(warn("side-refused", side=name, reason=reason))
+                continue
         found = [item for item in sides[name].warnings if not mixed or item.code not in EXPLAINED_BY_MIXED_PRESSURES]
-        warnings[name] = [item.in_units(in_side) for item in (*pressures, *dropped, *clipped, *found)]
+        warnings[name] = [*pressures, *dropped, *clipped, *found]
     return sides, refused + _by_side(warnings)
 
 

@@ -2,10 +2,9 @@
 
 from dataclasses import dataclass
 
-from dzdesign.identify.data_quality.catalogue import Finding
 from dzdesign.identify.fitting.constrained_fits import KneeFit
 from dzdesign.identify.knees.described_tests import DescribedTests
-from dzdesign.identify.valve.model import ValveModel
+from dzdesign.identify.valve.model import ValveModel, Warning_
 from dzdesign.identify.valve.side_model import SideModel
 
 
@@ -16,7 +15,7 @@ class SideIdentification:
     model: SideModel
     described: DescribedTests
     knees: KneeFit
-    warnings: tuple[Finding, ...]
+    warnings: tuple[Warning_, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

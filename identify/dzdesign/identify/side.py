@@ -7,8 +7,7 @@ import numpy as np
 
 from dzdesign.core.artefact_types import own_result
 from dzdesign.core.errors import InputError
-from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
-from dzdesign.core.worded import all_of, worded
+from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits, all_of, worded
 from dzdesign.identify.constants import L_MIN, MPA
 from dzdesign.identify.data_quality.low_flow import about_low_flow
 from dzdesign.identify.data_quality.side_warnings import find_warnings

@@ -8,7 +8,7 @@ from math import ceil, floor
 from dzdesign.codegen.amplifier.device import Device, Parameter
 from dzdesign.core.errors import InputError
 from dzdesign.core.option_readers import percent, quantity
-from dzdesign.core.worded import errors_in
+from dzdesign.core.recorded_units import shown_in
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.fixed_offset import (
     Characteristic,
@@ -98,7 +98,7 @@ def amplifier_setting(
     InputError
         If the device's range does not hold the setting, it has fewer solenoids, or an option is not of it.
     """
-    with errors_in(compensator.valve.recorded_units):
+    with shown_in(compensator.valve.recorded_units):
         signs, is_table, at = compensator.signals.signs, device.law == "table", None
         if len(signs) > 1 and not device.takes_both_signs:
             raise InputError(f"{device.title} drives one solenoid, but the design has two; choose another device")

@@ -8,8 +8,7 @@ from typing import Literal, Protocol, TypeVar
 
 import msgspec
 
-from dzdesign.core.recorded_units import RecordedUnits
-from dzdesign.core.worded import Worded, in_units, worded
+from dzdesign.core.recorded_units import worded
 from dzdesign.identify.valve.model import Warning_
 
 
@@ -39,28 +38,18 @@ def catalogue() -> dict[str, Entry]:
     return msgspec.toml.decode(files(__package__).joinpath("warnings.toml").read_bytes(), type=dict[str, Entry])
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Finding:
-    """A warning whose text waits for the units of the recordings."""
-
-    code: str
-    text: Worded
-    source: str | None
-
-    def in_units(self, units: RecordedUnits) -> Warning_:
-        """Return the warning as valve.json holds it."""
-        return Warning_(code=self.code, text=in_units(self.text, units), source=self.source)
+Finding = Warning_
 
 
-def warn(code: str, source: str | None = None, case: str = "", **numbers: object) -> Finding:
-    """Return a warning of the catalogue.
+def warn(code: str, source: str | None = None, case: str = "", **numbers: object) -> Warning_:
+    """Return a warning of the catalogue, in the units of `shown_in`.
 
     A code that has several texts names one by `case`; `numbers` are what stands in it. No source: it is about all
     recordings.
     """
     text = catalogue()[code].text
     text = text if isinstance(text, str) else text[case]
-    return Finding(code=code, text=worded(" ".join(text.split()), **numbers), source=source)
+    return Warning_(code=code, text=worded(" ".join(text.split()), **numbers), source=source)
 
 
 class _Coded(Protocol):

@@ -11,11 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dzdesign.identify.constants import L_MIN
-from dzdesign.identify.data_quality.catalogue import Finding, warn
+from dzdesign.identify.data_quality.catalogue import warn
 from dzdesign.identify.knees.gated_line import UNSEEN
 from dzdesign.identify.knees.readings_at_rest import FEWEST_AT_REST, readings_at_rest
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.valve.model import Warning_
 
 #: Readings within this share of the largest are one reading.
 ONE_READING = 1e-6
@@ -56,7 +57,7 @@ class _Top:
 
 def without_clipping(
     tests: Sequence[RampTest], options: IdentifyOptions
-) -> tuple[list[RampTest], IdentifyOptions, tuple[Finding, ...]]:
+) -> tuple[list[RampTest], IdentifyOptions, tuple[Warning_, ...]]:
     """Return the recordings without what lies beyond the ends of the meter, its floor, and what to say.
 
     Wherever the meter was cut off below, the flow is zero; a floor that is declared stays, unless the meter was cut off
@@ -79,7 +80,7 @@ def without_clipping(
     return seen, replace(options, meter_floor=floor), (*warnings, *beyond)
 
 
-def _marked_upper_end(tests: Sequence[RampTest], u_max: float) -> tuple[list[RampTest], tuple[Finding, ...]]:
+def _marked_upper_end(tests: Sequence[RampTest], u_max: float) -> tuple[list[RampTest], tuple[Warning_, ...]]:
     """Return the recordings with the rows at the upper end of the meter's range marked, and what to say of each."""
     tops = [_top(test, u_max) for test in tests]
     left, findings = [], []

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from dzdesign.identify.constants import L_MIN
-from dzdesign.identify.data_quality.catalogue import Finding, warn
+from dzdesign.identify.data_quality.catalogue import warn
 from dzdesign.identify.knees.noise import robust_sigma
 from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.valve.model import Warning_
 
 #: Shares of the largest flow: below the one a reading is none, above the other there is flow beside it for certain.
 NONE, FLOW = 0.05, 0.2
@@ -47,7 +48,7 @@ class _DropOut:
     beside: float
 
 
-def without_drop_outs(tests: Sequence[RampTest]) -> tuple[list[RampTest], tuple[Finding, ...]]:
+def without_drop_outs(tests: Sequence[RampTest]) -> tuple[list[RampTest], tuple[Warning_, ...]]:
     """Return the recordings of one side, commands and flows positive, without such rows, and what to say of them."""
     kept, findings = [], []
     for test in tests:
@@ -62,7 +63,7 @@ def without_drop_outs(tests: Sequence[RampTest]) -> tuple[list[RampTest], tuple[
     return kept, tuple(findings)
 
 
-def _finding(test: RampTest, found: Sequence[_DropOut]) -> Finding:
+def _finding(test: RampTest, found: Sequence[_DropOut]) -> Warning_:
     longest = max(found, key=lambda part: part.stop - part.start)
     spans = [f"{test.time[part.start]:.2f} to {test.time[part.stop - 1]:.2f} s" for part in found[:NAMED]]
     more = f" and {len(found) - NAMED} more" if len(found) > NAMED else ""

@@ -4,11 +4,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from dzdesign.core.worded import all_of, worded
+from dzdesign.core.recorded_units import worded
 from dzdesign.identify.constants import L_MIN
-from dzdesign.identify.data_quality.catalogue import Finding, warn
+from dzdesign.identify.data_quality.catalogue import warn
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
 from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.valve.model import Warning_
 from dzdesign.identify.valve.side_model import PROMISED, SideModel
 
 #: Shift of the knees by the meter's lag, over u_max, above which a tenth of it matters.
@@ -25,7 +26,7 @@ SMALL_SHIFT = 5e-5
 READINGS_A_LEVEL = 5
 
 
-def about_the_meter(side: SideModel, group: DescribedTests, options: IdentifyOptions) -> Iterator[Finding]:
+def about_the_meter(side: SideModel, group: DescribedTests, options: IdentifyOptions) -> Iterator[Warning_]:
     """Yield the warnings about the flow meter, of one side."""
     yield from _about_a_hidden_zero(side)
     yield from _about_a_leak(side)
@@ -36,7 +37,7 @@ def about_the_meter(side: SideModel, group: DescribedTests, options: IdentifyOpt
     yield from _about_lag_and_order(side, group)
 
 
-def _about_a_hidden_zero(side: SideModel) -> Iterator[Finding]:
+def _about_a_hidden_zero(side: SideModel) -> Iterator[Warning_]:
     """Say that readings at rest are one number where the meter scatters, so that its zero error does not show."""
     unseen = side.certificate.unseen_below_L_min
     if unseen > side.certificate.level_L_min:
@@ -44,7 +45,7 @@ def _about_a_hidden_zero(side: SideModel) -> Iterator[Finding]:
         yield warn("zero-hidden", zero_L_min=unseen, shift_mV=shift_mV)
 
 
-def _about_a_leak(side: SideModel) -> Iterator[Finding]:
+def _about_a_leak(side: SideModel) -> Iterator[Warning_]:
     worst = max(side.tests, key=lambda test: test.leak_L_min)
     if worst.leak_L_min > 0 and worst.dp_MPa:
         shift_mV = 1e3 * max(test.leak_L_min / test.slope_L_min_V for test in side.tests)
@@ -52,7 +53,7 @@ def _about_a_leak(side: SideModel) -> Iterator[Finding]:
         yield warn("leak", worst.source, "at-rest", per_MPa=leak / worst.dp_MPa, leak_L_min=leak, shift_mV=shift_mV)
 
 
-def _about_the_zero_flow(side: SideModel, group: DescribedTests) -> Iterator[Finding]:
+def _about_the_zero_flow(side: SideModel, group: DescribedTests) -> Iterator[Warning_]:
     """Say of a declared flow at zero that a leak alone is more, or that it can't be told from none."""
     declared, allowed = side.certificate.zero_flow_L_min, side.zero_flow_L_min
     if declared is None or allowed is None or allowed <= PROMISED * declared:
@@ -62,8 +63,8 @@ def _about_the_zero_flow(side: SideModel, group: DescribedTests) -> Iterator[Fin
     numbers = {"declared_L_min": declared, "allowed_L_min": allowed}
     if max(group.leak) > 0 and max(rest) > declared:
         above = [(test.dp_MPa, flow) for test, flow in zip(side.tests, rest, strict=True) if flow > declared]
-        places = all_of([worded("{dp:.3g #MPa}", dp=dp) for dp, _ in above[:-1]], ", ")
-        flows = all_of([worded("{flow:.3g #L/min}", flow=flow) for _, flow in above[:-1]], ", ")
+        places = ", ".join(worded("{dp:.3g #MPa}", dp=dp) for dp, _ in above[:-1])
+        flows = ", ".join(worded("{flow:.3g #L/min}", flow=flow) for _, flow in above[:-1])
         comma = ", " if len(above) > 1 else ""
         yield warn(
             "zero-flow", worst.source, "leak",
@@ -77,7 +78,7 @@ def _about_the_zero_flow(side: SideModel, group: DescribedTests) -> Iterator[Fin
         yield warn("zero-flow", worst.source, "unresolved", **numbers)
 
 
-def _about_the_noise_level(side: SideModel, options: IdentifyOptions) -> Iterator[Finding]:
+def _about_the_noise_level(side: SideModel, options: IdentifyOptions) -> Iterator[Warning_]:
     if options.noise_level is None:
         return
     declared, worst = options.noise_level / L_MIN, max(side.tests, key=lambda test: test.noise_level_L_min)
@@ -85,7 +86,7 @@ def _about_the_noise_level(side: SideModel, options: IdentifyOptions) -> Iterato
         yield warn("noise-level", worst.source, declared_L_min=declared, level_L_min=worst.noise_level_L_min)
 
 
-def _about_steps(side: SideModel, tests: tuple[DescribedTest, ...], options: IdentifyOptions) -> Iterator[Finding]:
+def _about_steps(side: SideModel, tests: tuple[DescribedTest, ...], options: IdentifyOptions) -> Iterator[Warning_]:
     """Say of a flow in coarse steps that a logger which cuts off, instead of rounding, puts all thresholds too high."""
     levels = [np.unique(item.test.q) for item in tests]
     steps = [
@@ -106,7 +107,7 @@ def _about_steps(side: SideModel, tests: tuple[DescribedTest, ...], options: Ide
         )
 
 
-def _about_the_lag(group: DescribedTests, options: IdentifyOptions) -> Iterator[Finding]:
+def _about_the_lag(group: DescribedTests, options: IdentifyOptions) -> Iterator[Warning_]:
     rates = [shape.prepared.branch.rate for item in group.tests for shape in item.branches]
     rates = [rate for rate in rates if rate > 0]
     fastest, lag = max(rates, default=0.0), group.lag
@@ -130,7 +131,7 @@ def _about_the_lag(group: DescribedTests, options: IdentifyOptions) -> Iterator[
         yield warn("command-late", late_s=late, error_s=lag.longer, shift_mV=shift_mV, rate_V_s=fastest)
 
 
-def _about_lag_and_order(side: SideModel, group: DescribedTests) -> Iterator[Finding]:
+def _about_lag_and_order(side: SideModel, group: DescribedTests) -> Iterator[Warning_]:
     """Say of a declared lag that it puts the closing knee above the opening one by more than its tolerance may."""
     lag = group.lag
     if lag.origin != "declared" or lag.seconds == 0 or None in group.tests[0].shapes:

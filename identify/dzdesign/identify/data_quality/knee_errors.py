@@ -9,9 +9,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from dzdesign.identify.data_quality.catalogue import Finding, warn
+from dzdesign.identify.data_quality.catalogue import warn
 from dzdesign.identify.knees.branch_shape import BranchShape
 from dzdesign.identify.knees.described_tests import DescribedTest
+from dzdesign.identify.valve.model import Warning_
 from dzdesign.identify.valve.ramp_result import TestResult
 from dzdesign.identify.valve.side_model import SideModel
 
@@ -25,7 +26,7 @@ PARTS, FEWEST_PARTS = 8, 4
 
 def about_errors(
     side: SideModel, tests: tuple[DescribedTest, ...], u_max: float, window: tuple[float, float]
-) -> Iterator[Finding]:
+) -> Iterator[Warning_]:
     """Yield a warning for each test whose knees are known badly, with the reason."""
     if all(test.u_knee_se_V <= NOISY * u_max for test in side.tests):
         return
@@ -70,7 +71,7 @@ def _departures(shape: BranchShape, count: int) -> np.ndarray:
     return np.array([part.mean() for part in np.array_split(residual, count)])
 
 
-def _bent(test: TestResult, left: float, declared: tuple[float, float]) -> Finding:
+def _bent(test: TestResult, left: float, declared: tuple[float, float]) -> Warning_:
     of_rising = test.u_knee_rising_se_V == test.u_knee_se_V
     straight = (test.straight_rising if of_rising else test.straight_falling) or declared
     (low, high), asked = ([100 * share for share in shares] for shares in (straight, declared))

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dzdesign.identify.data_quality.catalogue import Finding, warn
+from dzdesign.identify.data_quality.catalogue import warn
 from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.valve.model import Warning_
 
 #: A gap is that many times as long as nearly all steps of the clock: this quantile of them.
 LONGER, NEARLY_ALL = 10.0, 0.99
@@ -26,7 +27,7 @@ class Gap:
     u: tuple[float, float]
 
 
-def about_lost_rows(tests: Sequence[RampTest]) -> Iterator[Finding]:
+def about_lost_rows(tests: Sequence[RampTest]) -> Iterator[Warning_]:
     """Yield one warning for all recordings together, if any lacks rows."""
     # Samples that were taken for missing have a warning of their own: no logger lost them.
     gaps = [gap for test in tests if not test.missing for gap in find_gaps(test)]

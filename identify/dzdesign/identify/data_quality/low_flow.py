@@ -2,16 +2,17 @@
 
 from collections.abc import Iterator, Mapping
 
-from dzdesign.identify.data_quality.catalogue import Finding, warn
+from dzdesign.identify.data_quality.catalogue import warn
 from dzdesign.identify.fitting.low_flow import Lowered, unseen_of_curve
 from dzdesign.identify.valve.guard_curve import Guard
+from dzdesign.identify.valve.model import Warning_
 from dzdesign.identify.valve.side_model import SideModel
 
 #: Times the level, the flow of the reading that a message asks for.
 ASKED = 2.0
 
 
-def about_low_flow(side: SideModel, lowered: Mapping[Guard, Lowered]) -> Iterator[Finding]:
+def about_low_flow(side: SideModel, lowered: Mapping[Guard, Lowered]) -> Iterator[Warning_]:
     """Yield the warnings about the readings of one side: thresholds that were lowered, and tests without a reading."""
     for guard, each in lowered.items():
         yield warn(

@@ -8,13 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from dzdesign.core.worded import Worded, all_of, worded
+from dzdesign.core.recorded_units import worded
 from dzdesign.identify.constants import FULL_SWEEP, L_MIN, MPA
-from dzdesign.identify.data_quality.catalogue import Finding, warn
+from dzdesign.identify.data_quality.catalogue import warn
 from dzdesign.identify.ramps.pooling import SAME_PRESSURE
 from dzdesign.identify.ramps.splitting import SHUT
 from dzdesign.identify.reading.named_pressure import claimed_pressures, contradicts
 from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.valve.model import Warning_
 from dzdesign.identify.valve.ramp_result import TestResult
 
 #: Pressure drops that differ by less than this share are one number: averaging may round the last digit.
@@ -46,12 +47,12 @@ FALLS, GROWS_TOO_LITTLE, GROWS_TOO_MUCH = 0.9, 2.5, 1.75
 WIDE_APART, NO_GROWTH = 1.4, 0.12
 
 
-def about_mixed_pressures(tests: Sequence[RampTest]) -> tuple[Finding, ...]:
+def about_mixed_pressures(tests: Sequence[RampTest]) -> tuple[Warning_, ...]:
     """Return what tells that recordings of several pressure drops pass for one: a stuck sensor, or else their flows."""
     return tuple(about_a_stuck_sensor(tests)) or tuple(about_mixtures(tests))
 
 
-def about_single_pressures(tests: Sequence[RampTest], mixed: Sequence[Finding]) -> tuple[Finding, ...]:
+def about_single_pressures(tests: Sequence[RampTest], mixed: Sequence[Warning_]) -> tuple[Warning_, ...]:
     """Return what is weak in the pressure drop of single recordings; of a stuck one not that it was typed in.
 
     Beside a stuck sensor, which `mixed` may tell of, there is nothing more to say.
@@ -63,7 +64,7 @@ def about_single_pressures(tests: Sequence[RampTest], mixed: Sequence[Finding]) 
     return (*stuck, *(item for item in about_typed_pressures(tests) if item.source not in known))
 
 
-def about_a_stuck_sensor(tests: Sequence[RampTest]) -> Iterator[Finding]:
+def about_a_stuck_sensor(tests: Sequence[RampTest]) -> Iterator[Warning_]:
     """Yield a warning if the recordings of one side show one pressure drop, noise aside, and must have several."""
     recorded = [test.dp for test in tests if test.dp is not None and not test.dp_is_declared]
     if len(tests) < 2 or len(recorded) < len(tests):
@@ -78,11 +79,11 @@ def about_a_stuck_sensor(tests: Sequence[RampTest]) -> Iterator[Finding]:
     explained = max(means) / min(means)
     top, flows = _flows_at_one_command(tests)
     claims = claimed_pressures([test.source for test in tests])
-    signs: list[Worded] = []
+    signs: list[str] = []
     if min(flows) > 0 and max(flows) > (1 + SAME_FLOW) * explained**0.5 * min(flows):
         signs.append(worded("the flows at {u_V:.3g V} differ by {by:.0%}", u_V=top, by=max(flows) / min(flows) - 1))
     if claims and max(claims) > (1 + SAME_FLOW) * explained * min(claims):
-        signs.append(worded("the files' names say different ones"))
+        signs.append("the files' names say different ones")
     if signs:
         one = high - low <= ONE_NUMBER * high
         about = worded(
@@ -90,7 +91,7 @@ def about_a_stuck_sensor(tests: Sequence[RampTest]) -> Iterator[Finding]:
             low=low / MPA,
             high=high / MPA,
         )
-        yield warn("pressure-stuck", None, "all", about=about, count=len(tests), signs=all_of(signs))
+        yield warn("pressure-stuck", None, "all", about=about, count=len(tests), signs=" and ".join(signs))
 
 
 def _stands_still(every: np.ndarray, low: float, middle: float, high: float) -> bool:
@@ -112,7 +113,7 @@ def _flows_at_one_command(tests: Sequence[RampTest]) -> tuple[float, list[float]
     return top, [flow if flow > SMALL_FLOW * max(flows) else 0.0 for flow in flows]
 
 
-def about_stuck_recordings(tests: Sequence[RampTest]) -> Iterator[Finding]:
+def about_stuck_recordings(tests: Sequence[RampTest]) -> Iterator[Warning_]:
     """Yield a warning for each recording whose pressure drop is one number to the last digit, and should not be.
 
     That is so where other recordings' readings scatter, or where the file's name says another pressure.
@@ -129,7 +130,7 @@ def about_stuck_recordings(tests: Sequence[RampTest]) -> Iterator[Finding]:
             yield warn("pressure-stuck", test.source, "one", dp_MPa=dp / MPA, signs=" and ".join(signs))
 
 
-def about_typed_pressures(tests: Sequence[RampTest]) -> Iterator[Finding]:
+def about_typed_pressures(tests: Sequence[RampTest]) -> Iterator[Warning_]:
     """Yield a warning for each recording, if the pressure drop of every one is one number: nothing was measured."""
     recorded = [test for test in tests if test.dp is not None and not test.dp_is_declared]
     typed = [(dp, test.source) for test in recorded if (dp := _one_number(test)) is not None]
@@ -153,7 +154,7 @@ def _scatters(test: RampTest) -> bool:
     return float(np.mean(np.diff(test.dp) != 0)) > CHANGES and np.unique(inner).size >= SCATTERED_LEVELS
 
 
-def about_mixtures(tests: Sequence[RampTest]) -> Iterator[Finding]:
+def about_mixtures(tests: Sequence[RampTest]) -> Iterator[Warning_]:
     """Yield a warning for each pressure drop at which recordings, taken as one test, differ grossly in their flow."""
     tops = [test.top for test in tests]
     whole = [test for test, top in zip(tests, tops, strict=True) if top >= FULL_SWEEP * max(tops)]
@@ -191,7 +192,7 @@ def _at_one_pressure(tests: Sequence[RampTest]) -> Iterator[tuple[float, list[Ra
         steady = steady[len(group) :]
 
 
-def about_flow_gains(tests: Sequence[TestResult]) -> Iterator[Finding]:
+def about_flow_gains(tests: Sequence[TestResult]) -> Iterator[Warning_]:
     """Yield a warning for each test whose flow gain contradicts its pressure drop, by those of the other tests.
 
     The gain beyond the knee, and not the flow at one command, is compared: a supply at its limit and a knee that moves
@@ -216,7 +217,7 @@ def about_flow_gains(tests: Sequence[TestResult]) -> Iterator[Finding]:
         )  # fmt: skip
 
 
-def _about_no_growth(tests: Sequence[TestResult]) -> Iterator[Finding]:
+def _about_no_growth(tests: Sequence[TestResult]) -> Iterator[Warning_]:
     """Say of flow gains that are the same at all pressure drops that these are not the valve's, or do not act on it."""
     low, high = tests[0], tests[-1]
     dp, gains = (np.log([getattr(test, key) for test in tests]) for key in ("dp_MPa", "slope_L_min_V"))

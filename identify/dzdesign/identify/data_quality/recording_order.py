@@ -3,15 +3,16 @@
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
-from dzdesign.identify.data_quality.catalogue import Finding, warn
+from dzdesign.identify.data_quality.catalogue import warn
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.reading.series_order import began, ended, on_one_clock, order_is_stated, runs_back
+from dzdesign.identify.valve.model import Warning_
 
 #: A pause within a series of ramps is shorter than this, s: half a year.
 LONGEST_PAUSE = 183 * 86_400.0
 
 
-def about_order(tests: Sequence[RampTest]) -> Iterator[Finding]:
+def about_order(tests: Sequence[RampTest]) -> Iterator[Warning_]:
     """Yield what contradicts the order in which the recordings count, or the dates that it rests on."""
     if not on_one_clock(tests):
         return

@@ -5,27 +5,28 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from dzdesign.identify.constants import L_MIN
-from dzdesign.identify.data_quality.catalogue import Finding, most_serious_first, warn
+from dzdesign.identify.data_quality.catalogue import most_serious_first, warn
 from dzdesign.identify.data_quality.lost_rows import about_lost_rows
 from dzdesign.identify.data_quality.recording_order import about_order
 from dzdesign.identify.knees.readings_at_rest import moved_at_rest
 from dzdesign.identify.reading.clock import ASSUMED_MS
 from dzdesign.identify.reading.metering_edge import EDGES
 from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.valve.model import Warning_
 from dzdesign.identify.valve.recorded_drop import drop_in_words
 
 #: Files that a text lists.
 NAMED_FILES = 3
 
 
-def about_recordings(tests: Sequence[RampTest]) -> tuple[Finding, ...]:
+def about_recordings(tests: Sequence[RampTest]) -> tuple[Warning_, ...]:
     """Return what is to be said of the recordings themselves, the most serious first."""
     by_name = sorted(tests, key=lambda test: test.source)  # `verify` reads the files again, in another order
     of_each = (item for test in by_name for item in _about_one(test))
     return most_serious_first([*_about_simulation(tests), *about_order(tests), *about_lost_rows(by_name), *of_each])
 
 
-def about_rest(tests: Sequence[RampTest], u_max: float) -> Iterator[Finding]:
+def about_rest(tests: Sequence[RampTest], u_max: float) -> Iterator[Warning_]:
     """Yield a warning where flow passes while the command rests, of the recording where it does the longest."""
     moved = [moved_at_rest(test, u_max) for test in tests]
     lasts = [
@@ -43,7 +44,7 @@ def about_rest(tests: Sequence[RampTest], u_max: float) -> Iterator[Finding]:
         )
 
 
-def _about_one(test: RampTest) -> Iterator[Finding]:
+def _about_one(test: RampTest) -> Iterator[Warning_]:
     if test.clock_doubt:
         yield warn("time-unit", test.source, "taken" if test.clock_doubt == ASSUMED_MS else "not-taken")
     if test.side_without_dp:
@@ -64,7 +65,7 @@ def _about_one(test: RampTest) -> Iterator[Finding]:
         yield warn("thinned", test.source, rows=test.rows_read, run=test.run, samples=test.time.size)
 
 
-def _about_simulation(tests: Sequence[RampTest]) -> Iterator[Finding]:
+def _about_simulation(tests: Sequence[RampTest]) -> Iterator[Warning_]:
     made_up = [test.source for test in tests if test.simulated]
     if not made_up:
         return

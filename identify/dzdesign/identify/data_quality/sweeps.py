@@ -4,11 +4,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from dzdesign.core.worded import worded
+from dzdesign.core.recorded_units import worded
 from dzdesign.identify.constants import L_MIN
-from dzdesign.identify.data_quality.catalogue import Finding, warn
+from dzdesign.identify.data_quality.catalogue import warn
 from dzdesign.identify.knees.branch_shape import BranchShape
 from dzdesign.identify.knees.described_tests import DescribedTest
+from dzdesign.identify.valve.model import Warning_
 from dzdesign.identify.valve.ramp_result import TestResult
 from dzdesign.identify.valve.side_model import SideModel
 
@@ -22,7 +23,7 @@ CURVED = 0.05
 MANY_OUTLIERS = 0.02
 
 
-def about_sweeps(side: SideModel, tests: tuple[DescribedTest, ...], u_max: float) -> Iterator[Finding]:
+def about_sweeps(side: SideModel, tests: tuple[DescribedTest, ...], u_max: float) -> Iterator[Warning_]:
     """Yield the warnings about the sweeps of one side."""
     for test, item in zip(side.tests, tests, strict=True):
         yield from _about_branches(test)
@@ -35,7 +36,7 @@ def about_sweeps(side: SideModel, tests: tuple[DescribedTest, ...], u_max: float
         yield warn("no-saturation", None, case, k_x_max_over_u_max=side.k_x_max_over_u_max)
 
 
-def _about_branches(test: TestResult) -> Iterator[Finding]:
+def _about_branches(test: TestResult) -> Iterator[Warning_]:
     rising, falling = test.u_knee_rising_V, test.u_knee_falling_V
     if falling is None:
         yield warn("one-branch", test.source, "rising-only")
@@ -45,7 +46,7 @@ def _about_branches(test: TestResult) -> Iterator[Finding]:
         yield warn("branch-order", test.source, closes=falling, opens=rising)
 
 
-def _about_holes(test: TestResult, item: DescribedTest, guard: str) -> Iterator[Finding]:
+def _about_holes(test: TestResult, item: DescribedTest, guard: str) -> Iterator[Warning_]:
     for way, shape in zip(("opening", "closing"), item.shapes, strict=True):
         if shape is None or not shape.tail.hole:
             continue
@@ -55,7 +56,7 @@ def _about_holes(test: TestResult, item: DescribedTest, guard: str) -> Iterator[
         yield warn("gap", test.source, way=way, low_V=low, high_V=high, bound=bound)
 
 
-def _about_the_command(test: TestResult, item: DescribedTest, guard: str, u_max: float) -> Iterator[Finding]:
+def _about_the_command(test: TestResult, item: DescribedTest, guard: str, u_max: float) -> Iterator[Warning_]:
     top = max(float(item.test.u.max()), item.test.unseen[1])
     if top < FULL_COMMAND * u_max:
         yield warn("not-full-command", test.source, top_V=top, u_max_V=u_max)
@@ -64,7 +65,7 @@ def _about_the_command(test: TestResult, item: DescribedTest, guard: str, u_max:
         yield warn("edge-not-swept", test.source, lowest_V=lowest, guard=guard, threshold_V=test.u_guard_V)
 
 
-def _about_the_flow(test: TestResult, item: DescribedTest) -> Iterator[Finding]:
+def _about_the_flow(test: TestResult, item: DescribedTest) -> Iterator[Warning_]:
     shapes = item.branches
     whole = not any(shape.prepared.unseen_top for shape in shapes)
     largest, at_top, noise = (

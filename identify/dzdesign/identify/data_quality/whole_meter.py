@@ -2,16 +2,16 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from dzdesign.core.worded import worded
-from dzdesign.identify.data_quality.catalogue import Finding, warn
+from dzdesign.core.recorded_units import worded
+from dzdesign.identify.data_quality.catalogue import warn
 from dzdesign.identify.ramps.sides import flow_is_negative, tests_of_side
 from dzdesign.identify.reading.ramp_test import RampTest
-from dzdesign.identify.valve.model import SIDES
+from dzdesign.identify.valve.model import SIDES, Warning_
 
 
 def about_whole_meter(
     zeros_of_sides: Mapping[str, Mapping[str, float]], tests: Sequence[RampTest], u_max: float
-) -> Iterator[Finding]:
+) -> Iterator[Warning_]:
     """Yield what is to be said; `tests` are all recordings.
 
     `zeros_of_sides` have for each side that was identified source -> flow at zero command, L/min, where it is not zero.
@@ -26,7 +26,7 @@ def about_whole_meter(
 
 def _about_zeros(
     zeros_of_sides: Mapping[str, Mapping[str, float]], unsigned: Sequence[str], recordings: int
-) -> Iterator[Finding]:
+) -> Iterator[Warning_]:
     """Say of all recordings together what the meter reads at zero command, with its own sign."""
     zeros: dict[str, float] = {}
     leaks = False

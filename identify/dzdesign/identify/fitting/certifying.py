@@ -8,7 +8,7 @@ import numpy as np
 
 from dzdesign.core.artefact_types import own_result
 from dzdesign.core.errors import InputError, InternalError
-from dzdesign.core.worded import Worded, worded
+from dzdesign.core.recorded_units import Worded, worded
 from dzdesign.identify.constants import MPA, REFUSED, Premise
 from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, FINEST_ERROR
 from dzdesign.identify.fitting.constrained_fits import fit_offset

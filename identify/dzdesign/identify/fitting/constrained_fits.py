@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.core.worded import worded
+from dzdesign.core.recorded_units import worded
 from dzdesign.identify.fitting.casadi_problems import SOLVER_LOCK, branch_numbers, offset_solver, solver_with_numbers
 from dzdesign.identify.knees.branch_shape import BranchShape
 from dzdesign.identify.valve.staircase import Direction

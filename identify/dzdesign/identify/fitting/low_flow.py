@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.core.worded import Worded, worded
+from dzdesign.core.recorded_units import Worded, worded
 from dzdesign.identify.constants import L_MIN, MPA
 from dzdesign.identify.fitting.guarded_thresholds import GuardedThreshold, Guarding
 from dzdesign.identify.fitting.threshold import Threshold

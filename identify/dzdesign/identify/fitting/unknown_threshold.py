@@ -1,6 +1,6 @@
 """Why a threshold that lies well above zero has no lower bound there: the readings tell it too badly."""
 
-from dzdesign.core.worded import Worded, worded
+from dzdesign.core.recorded_units import Worded, worded
 from dzdesign.identify.constants import MPA
 from dzdesign.identify.fitting.guarded_thresholds import Guarding
 from dzdesign.identify.knees.described_tests import DescribedTests

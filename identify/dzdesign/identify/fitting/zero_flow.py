@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.core.worded import worded
+from dzdesign.core.recorded_units import worded
 from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, lower_bounds
 from dzdesign.identify.fitting.threshold import Threshold

@@ -3,7 +3,7 @@
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.core.worded import worded
+from dzdesign.core.recorded_units import worded
 from dzdesign.identify.knees.gated_line import GATE, GatedLine, PreparedBranch, fit_line
 from dzdesign.identify.knees.noise import measure_roughness
 from dzdesign.identify.knees.profile import crossing

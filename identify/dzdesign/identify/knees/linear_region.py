@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.core.worded import worded
+from dzdesign.core.recorded_units import worded
 from dzdesign.identify.knees.gated_line import GatedLine, PreparedBranch
 from dzdesign.identify.knees.line_fitting import lay_line
 from dzdesign.identify.knees.noise import correlation_upper_limit, robust_sigma, shared_correlation

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.core.worded import Worded, worded
+from dzdesign.core.recorded_units import worded
 from dzdesign.identify.constants import MPA
 from dzdesign.identify.knees.described_tests import DescribedTest
 from dzdesign.identify.reading.ramp_test import RampTest, despiked
@@ -23,7 +23,7 @@ def refuse_mixed_branches(described: Sequence[DescribedTest], recordings: Sequen
         lacking = [item for item in described if item.shapes[column] is None]
         if not lacking or len(lacking) == len(described):
             continue
-        item, remedy = lacking[0], worded("record every pressure drop up and down, or leave that file out")
+        item, remedy = lacking[0], "record every pressure drop up and down, or leave that file out"
         remedy = _pressure_on_its_way(item, column, described, recordings) or remedy
         raise InputError(
             worded(
@@ -37,7 +37,7 @@ def refuse_mixed_branches(described: Sequence[DescribedTest], recordings: Sequen
 
 def _pressure_on_its_way(
     item: DescribedTest, column: int, described: Sequence[DescribedTest], recordings: Sequence[RampTest]
-) -> Worded | None:
+) -> str | None:
     """Return what to say where the branch that a test lacks was run at another pressure drop, in the same recording."""
     other = next(
         (

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.core.worded import worded
+from dzdesign.core.recorded_units import worded
 from dzdesign.identify.constants import FULL_SWEEP, L_MIN, SMALLEST_DP
 from dzdesign.identify.knees.between_ramps import BetweenRamps, compare_ramps, knees_of_ramps
 from dzdesign.identify.knees.branch_shape import BranchShape

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.core.worded import worded
+from dzdesign.core.recorded_units import worded
 from dzdesign.identify.constants import L_MIN, LARGEST_DP, MPA, SMALLEST_DP
 from dzdesign.identify.knees.gated_line import PreparedBranch
 from dzdesign.identify.knees.noise import robust_sigma

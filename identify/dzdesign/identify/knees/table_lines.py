@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.core.worded import worded
+from dzdesign.core.recorded_units import worded
 from dzdesign.identify.knees.gated_line import GatedLine, PreparedBranch, fit_line
 from dzdesign.identify.knees.noise import Roughness
 from dzdesign.identify.knees.profile import crossing
