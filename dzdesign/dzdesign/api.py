@@ -17,8 +17,8 @@ True
 """
 
 from dzdesign.batch.arguments import BatchArguments
+from dzdesign.core.display import display_by
 from dzdesign.core.errors import DzdesignError, InputError, RequirementError
-from dzdesign.core.result_display import display_by
 from dzdesign.keywords import with_keywords
 from dzdesign.stages import assess as assess_stage
 from dzdesign.stages import batch as batch_stage

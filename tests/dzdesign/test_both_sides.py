@@ -10,7 +10,7 @@ from dzdesign.codegen.project import target_named
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import to_json_bytes
-from dzdesign.core.verdicts import NOT_ASKED_FOR, NOT_CHECKED
+from dzdesign.core.display import NOT_ASKED_FOR, NOT_CHECKED
 from dzdesign.design.designing import design
 from dzdesign.design.options import options_of
 from dzdesign.design.pressure_inputs import not_covered

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from dzdesign.core.strict_templates import strict_templates
+from dzdesign.core.display import strict_templates
 
 
 def texts(files: Mapping[str, Mapping[str, object]], banner: Sequence[str] = ()) -> dict[str, str]:

@@ -6,9 +6,9 @@ from types import SimpleNamespace
 
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import to_json_bytes
+from dzdesign.core.display import DOES_NOT_HOLD, NOT_CHECKED
 from dzdesign.core.documents import to_json
 from dzdesign.core.errors import InputError
-from dzdesign.core.verdicts import DOES_NOT_HOLD, NOT_CHECKED
 from dzdesign.verify import requirements
 from dzdesign.verify.evidence import Evidence
 from dzdesign.verify.outputs import verification as outputs

@@ -12,10 +12,10 @@ from importlib import import_module
 from dzdesign.codegen.amplifier.device import DEVICE_NAMES
 from dzdesign.codegen.project import TARGET_NAMES, TEXT_AS_IT_IS, origin_of, target_named
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
+from dzdesign.core.display import ShownInNotebooks
 from dzdesign.core.documents import sha256_of
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.options import flag_of
-from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import OutputManifest
 

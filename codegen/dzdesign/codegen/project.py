@@ -27,10 +27,9 @@ from dzdesign.codegen.target import Target, folder_of
 from dzdesign.codegen.vectors import vectors_text
 from dzdesign.codegen.wiring import wiring_of
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
+from dzdesign.core.display import ShownInNotebooks, strict_templates
 from dzdesign.core.documents import sha256_of
 from dzdesign.core.errors import DzdesignError, InputError, nearest
-from dzdesign.core.result_display import ShownInNotebooks
-from dzdesign.core.strict_templates import strict_templates
 from dzdesign.design.certificate import reach_of_certificate
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import BLOCK_FILE, VECTORS_NAME, Calibration, FirmwareManifest, FirmwareOrigin

@@ -2,7 +2,7 @@
 
 An artefact is declared once. The annotation of a field says its type, unit and bounds, the docstring below the field
 its meaning (or a ``description`` in the annotation); ``__post_init__`` holds the rules between fields.
-`dzdesign.core.artefact_reading` reads it, `dzdesign.core.artefact_schema` describes it.
+`dzdesign.core.artefact_reading` reads it and describes it.
 
 Examples
 --------

@@ -1,42 +1,33 @@
-"""Units at the border: text such as ``"1 MPa"`` or a column's unit becomes an SI number, by way of pint."""
+"""Units at the border: text such as ``"1 MPa"``, a column's unit or a signal becomes SI numbers, by way of pint."""
 
 import math
 import re
+from dataclasses import dataclass
+from fractions import Fraction
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, final
 
 from dzdesign.core.errors import InputError, nearest, quoted
 
 if TYPE_CHECKING:
     import pint
 
-#: The SI unit in which each quantity is kept inside, and the units to name when one is not understood.
-SI_UNIT = {
-    "time": "s",
-    "voltage": "V",
-    "pressure": "Pa",
-    "flow": "m**3/s",
-    "length": "m",
-    "frequency": "Hz",
-    "ratio": "",
-    "current": "A",
-    "resistance": "ohm",
-    "inductance": "H",
-    "curvature": "V/Pa**2",
+#: Of each quantity the SI unit in which it is kept inside, and the units to name when one is not understood.
+_QUANTITIES = {
+    "time": ("s", "s, ms, min"),
+    "voltage": ("V", "V, mV"),
+    "pressure": ("Pa", "MPa, bar, kPa, psi"),
+    "flow": ("m**3/s", "L/min, Lmin, m3/s, gpm"),
+    "length": ("m", "mm, m, in"),
+    "frequency": ("Hz", "Hz, kHz"),
+    "ratio": ("", "%"),
+    "current": ("A", "mA, A"),
+    "resistance": ("ohm", "ohm, kohm"),
+    "inductance": ("H", "mH, H"),
+    "curvature": ("V/Pa**2", "mV/MPa^2, mV/bar^2"),
 }
-EXAMPLES = {
-    "time": "s, ms, min",
-    "voltage": "V, mV",
-    "pressure": "MPa, bar, kPa, psi",
-    "flow": "L/min, Lmin, m3/s, gpm",
-    "length": "mm, m, in",
-    "frequency": "Hz, kHz",
-    "ratio": "%",
-    "current": "mA, A",
-    "resistance": "ohm, kohm",
-    "inductance": "mH, H",
-    "curvature": "mV/MPa^2, mV/bar^2",
-}
+SI_UNIT = {quantity: unit for quantity, (unit, _) in _QUANTITIES.items()}
+EXAMPLES = {quantity: units for quantity, (_, units) in _QUANTITIES.items()}
 #: Spellings of data-acquisition programs that pint does not read.
 SPELLINGS = {
     **dict.fromkeys(("lmin", "l_min", "lpm", "l/min", "l/m", "liter/min", "litre/min", "ltr/min"), "L/min"),
@@ -221,18 +212,6 @@ def parse_quantity(text: str, quantity: str, option: str) -> float:
     return value
 
 
-def span_MPa(low: float, high: float, digits: int = 2) -> str:
-    """Say between which pressure drops something holds, or at which one.
-
-    Examples
-    --------
-    >>> span_MPa(1.0, 4.0), span_MPa(0.9993, 0.9993)
-    ('from 1.00 to 4.00 MPa', 'at 1.00 MPa')
-    """
-    first, last = f"{low:.{digits}f}", f"{high:.{digits}f}"
-    return f"at {first} MPa" if first == last else f"from {first} to {last} MPa"
-
-
 def chance(p: float) -> str:
     """Say a p-value; one so small that only rounding is in its digits is said to be below.
 
@@ -242,3 +221,94 @@ def chance(p: float) -> str:
     ('p = 0.031', 'p < 1e-9')
     """
     return f"p = {p:.2g}" if p >= 1e-9 else "p < 1e-9"
+
+
+#: A signal as an engineer writes it, such as ``4..20 mA on 150 ohm = -10..10 V``: one reading for all options. Beyond
+#: this length it is none, and matching it would take the square of its length.
+LONGEST_SIGNAL = 120
+_NUMBER = r"[-+]?\d{1,9}(?:[.,]\d{1,9})?"
+_POSITIVE = r"\d{1,9}(?:[.,]\d{1,9})?"
+SIGNAL = re.compile(
+    rf"\s*(?P<low>{_NUMBER})\s*\.\.\s*(?P<high>{_NUMBER})(?:\s*(?!on\b|x\b)(?P<unit>[^\d\s=+.,_-][^\s=+,]*))?"
+    rf"(?:\s+on\s+(?P<shunt>{_POSITIVE})\s*(?P<ohm>[A-Za-zΩ]+))?"
+    rf"(?:\s+x\s+(?P<gain>{_POSITIVE}))?"
+    rf"(?:\s*\+\s*(?P<offset>{_POSITIVE})\s*(?P<volt>[A-Za-z]+))?"
+    rf"(?:\s*=\s*(?:(?P<bottom>{_NUMBER})\s*\.\.\s*)?(?P<top>{_NUMBER})\s*(?P<means>\D\S*(?:\s\S+)*))?\s*",
+    re.ASCII,
+)
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Meaning:
+    """What a signal's ends stand for, in a unit as it was written; a single value is that of the upper end."""
+
+    bottom: Fraction
+    top: Fraction
+    unit: str
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SignalRange:
+    """``LOW..HIGH [UNIT] [on SHUNT ohm] [x GAIN] [+ OFFSET V] [= [BOTTOM..]TOP UNIT]``, as it was written."""
+
+    text: str
+    #: Ends, in `unit`; empty for a bare number, such as a duty cycle.
+    low: Fraction
+    high: Fraction
+    unit: str
+    #: Resistor that makes a voltage of a current, ohm; None without one.
+    shunt_ohm: Fraction | None
+    #: Of the attenuator behind it, and what is added, V.
+    gain: Fraction
+    offset_V: Fraction
+    meaning: Meaning | None
+
+    @property
+    def is_wired(self) -> bool:
+        """Whether it says how the signal becomes the voltage at a converter's pin."""
+        return self.shunt_ohm is not None or self.gain != 1 or self.offset_V != 0
+
+
+def read_signal_range(text: str, what: str, *, points: bool = False) -> SignalRange | None:
+    """Read a signal; None if it is none. `what` and `points` are those of `refuse_thousands`.
+
+    Raises
+    ------
+    InputError
+        If a unit of the wiring is none, or a number may have thousands.
+
+    Examples
+    --------
+    >>> read_signal_range("4..20 mA on 150 ohm = -10..10 V", "--command-signal").meaning
+    Meaning(bottom=Fraction(-10, 1), top=Fraction(10, 1), unit='V')
+    """
+    match = SIGNAL.fullmatch(text) if len(text) <= LONGEST_SIGNAL else None
+    if match is None:
+        return None
+    refuse_thousands(text, what, points=points)
+    meaning = None
+    if match["top"]:
+        meaning = Meaning(bottom=_exact(match["bottom"] or "0"), top=_exact(match["top"]), unit=match["means"].strip())
+    shunt = match["shunt"] and _exact(match["shunt"]) * _exact_factor(match["ohm"].replace("Ω", "ohm"), "resistance")
+    offset = _exact(match["offset"]) * _exact_factor(match["volt"], "voltage") if match["offset"] else Fraction(0)
+    return SignalRange(
+        text=text,
+        low=_exact(match["low"]),
+        high=_exact(match["high"]),
+        unit=match["unit"] or "",
+        shunt_ohm=shunt or None,
+        gain=_exact(match["gain"] or "1"),
+        offset_V=offset,
+        meaning=meaning,
+    )
+
+
+def _exact(number: str) -> Fraction:
+    return Fraction(number.replace(",", "."))
+
+
+def _exact_factor(unit: str, quantity: str) -> Fraction:
+    """Return the exact factor from a unit to SI."""
+    return Fraction(repr(si_factor(unit, quantity)))

@@ -9,9 +9,9 @@ from typing import Annotated, ClassVar, Literal
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import Artefact, RuleError, as_document, quantity, schema_of
+from dzdesign.core.display import ShownInNotebooks
 from dzdesign.core.documents import sha256_of, to_json
 from dzdesign.core.errors import InputError, RequirementError
-from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.derivation.law import law
 from dzdesign.derivation.scaling import (
     Line,

@@ -7,8 +7,7 @@ from math import ceil
 
 from dzdesign.core.artefact_types import RuleError
 from dzdesign.core.errors import InputError, quoted
-from dzdesign.core.signal_ranges import Meaning, read_signal_range
-from dzdesign.core.units import measures, parse_quantity, si_factor
+from dzdesign.core.units import Meaning, measures, parse_quantity, read_signal_range, si_factor
 from dzdesign.design.signals import CommandSignal, PressureSignal
 from dzdesign.design.target_inputs import CommandError, Converter
 

@@ -8,10 +8,10 @@ from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING
 
+from dzdesign.core.display import strict_templates
 from dzdesign.core.errors import InputError, one_line
 from dzdesign.core.options import Paths, Table, paths_of
 from dzdesign.core.recorded_units import AS_COMPUTED
-from dzdesign.core.strict_templates import strict_templates
 from dzdesign.stages.recordings import distinct_names, expand, read_recordings, refuse_copies
 from dzdesign.terminal.progress import say, stage_progress, with_bar
 

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from dzdesign.core.verdicts import DOES_NOT_HOLD, verdict_words
+from dzdesign.core.display import DOES_NOT_HOLD, verdict_words
 from dzdesign.terminal.page import Table, new_console, put_line, put_table
 from dzdesign.terminal.tables import meter_line, put_units
 

@@ -2,8 +2,8 @@
 
 from typing import TYPE_CHECKING
 
+from dzdesign.core.display import NOT_ASKED_FOR, NOT_REQUIRED, verdict_words
 from dzdesign.core.recorded_units import AS_COMPUTED
-from dzdesign.core.verdicts import NOT_ASKED_FOR, NOT_REQUIRED, verdict_words
 from dzdesign.terminal.page import new_console, put_line, put_rows, volts
 
 if TYPE_CHECKING:

@@ -13,10 +13,10 @@ from dzdesign.assess.assessment import Assessment
 from dzdesign.core.artefact_files import MANIFEST_NAME, board_of, digest_of, manifest_of
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import Artefact, schema_of, to_json_bytes
+from dzdesign.core.display import verdict_words
 from dzdesign.core.documents import family_of, read_bytes, sha256_of, written_by
 from dzdesign.core.errors import InputError, and_more
 from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
-from dzdesign.core.verdicts import verdict_words
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest, OutputManifest, setting_words
 from dzdesign.design.side_law import SideLaw

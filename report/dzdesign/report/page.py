@@ -12,11 +12,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from dzdesign.core.artefact_files import TOOL
+from dzdesign.core.display import strict_templates, verdict_words
 from dzdesign.core.documents import read_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import RecordedUnits
-from dzdesign.core.strict_templates import strict_templates
-from dzdesign.core.verdicts import verdict_words
 from dzdesign.derivation.presentation.writers import anchor
 from dzdesign.report.artefacts import MadeOutputs
 from dzdesign.report.figure import PALETTE, ReportFigure, data_uri

@@ -7,8 +7,8 @@ from dataclasses import replace
 from dzdesign.assess.assessment import Assessment, PressureAssessment
 from dzdesign.assess.limits import LIMITED
 from dzdesign.assess.options import Set
+from dzdesign.core.display import DOES_NOT_HOLD, NOT_CHECKED, verdict_words
 from dzdesign.core.recorded_units import RecordedUnits
-from dzdesign.core.verdicts import DOES_NOT_HOLD, NOT_CHECKED, verdict_words
 from dzdesign.design.certificate import reach_of_certificate
 from dzdesign.design.compensator import Compensator
 from dzdesign.identify.valve.model import ValveModel

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from dzdesign.core.verdicts import verdict_words
+from dzdesign.core.display import verdict_words
 from dzdesign.design.certificate import not_counted
 from dzdesign.report.artefacts import Chain, MadeOutput, MadeOutputs, chain_of_evidence, outputs_in, read_chain
 from dzdesign.report.figure import figure_style

@@ -10,7 +10,7 @@ from typing import Annotated, ClassVar, Literal
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import Artefact, Sha256, quantity
-from dzdesign.core.verdicts import DOES_NOT_HOLD, NOT_CHECKED
+from dzdesign.core.display import DOES_NOT_HOLD, NOT_CHECKED
 from dzdesign.design.design_choices import Above
 from dzdesign.design.firmware_manifest import FirmwareOrigin
 from dzdesign.verify.current.results import CurrentLoopResult

@@ -10,7 +10,7 @@ from typing import Annotated, Generic, TypeVar
 
 from msgspec import Meta
 
-from dzdesign.core.verdicts import DOES_NOT_HOLD, HOLDS, NOT_CHECKED
+from dzdesign.core.display import DOES_NOT_HOLD, HOLDS, NOT_CHECKED
 
 #: How what every run tries is tried; and that of some firmware alone.
 EVERY_RUN, OF_SOME = "`verify`", "`verify` of a firmware "

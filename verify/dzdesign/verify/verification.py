@@ -10,10 +10,9 @@ from pathlib import Path
 
 from dzdesign.core.artefact_files import MANIFEST_NAME
 from dzdesign.core.artefact_types import THIS_TOOL, Artefact, SourceFile, as_document, schema_of, to_json_bytes
+from dzdesign.core.display import NOT_ASKED_FOR, NOT_CHECKED, ShownInNotebooks
 from dzdesign.core.documents import sha256_of
 from dzdesign.core.errors import RequirementError
-from dzdesign.core.result_display import ShownInNotebooks
-from dzdesign.core.verdicts import NOT_ASKED_FOR, NOT_CHECKED
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.design.pressure_inputs import not_covered

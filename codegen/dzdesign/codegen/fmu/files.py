@@ -26,11 +26,11 @@ from dzdesign.codegen.banner import banner_of
 from dzdesign.codegen.fmu.description import SOURCE, Model, model_description
 from dzdesign.codegen.fmu.models import compensator_model, plant_model, plant_of
 from dzdesign.core.artefact_files import TOOL
+from dzdesign.core.display import strict_templates
 from dzdesign.core.documents import sha256_of
 from dzdesign.core.errors import MissingToolError, quoted
 from dzdesign.core.placing import scratch_folder
 from dzdesign.core.processes import run_program
-from dzdesign.core.strict_templates import strict_templates
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareOrigin
 

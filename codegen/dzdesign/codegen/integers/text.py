@@ -6,8 +6,8 @@ from textwrap import wrap
 from dzdesign.codegen.banner import banner_of
 from dzdesign.codegen.core.certificate_text import equation_of
 from dzdesign.codegen.integers.form import Form, Node
+from dzdesign.core.display import strict_templates
 from dzdesign.core.errors import DzdesignError
-from dzdesign.core.strict_templates import strict_templates
 from dzdesign.derivation.law import law
 from dzdesign.design.compensator import Compensator
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import sympy
 
-from dzdesign.core.strict_templates import strict_templates
+from dzdesign.core.display import strict_templates
 from dzdesign.derivation.account.statement import Outcome
 from dzdesign.derivation.presentation.content import PARTS, DerivationReport, Entry, Formula, Line, Words
 from dzdesign.derivation.presentation.formulas import to_latex, to_mathml, to_text

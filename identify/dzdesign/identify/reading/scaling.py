@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import final
 
 from dzdesign.core.errors import InputError
-from dzdesign.core.signal_ranges import SignalRange, read_signal_range
-from dzdesign.core.units import SI_UNIT, measures, si_factor
+from dzdesign.core.units import SI_UNIT, SignalRange, measures, read_signal_range, si_factor
 from dzdesign.identify.reading.column_labels import (
     EXAMPLE_LABELS,
     LONGEST_NAME,

@@ -14,8 +14,7 @@ from dzdesign.core.recorded_units import (
     name_of_unit,
     significant,
 )
-from dzdesign.core.signal_ranges import read_signal_range
-from dzdesign.core.units import measures, si_factor
+from dzdesign.core.units import measures, read_signal_range, si_factor
 from dzdesign.identify.constants import L_MIN, MPA
 from dzdesign.identify.reading.column_labels import PRESSURES, Column
 from dzdesign.identify.reading.ramp_test import RampTest

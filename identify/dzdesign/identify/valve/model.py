@@ -7,11 +7,11 @@ from typing import Annotated, ClassVar, Literal
 from msgspec import UNSET, Meta, UnsetType
 
 from dzdesign.core.artefact_types import Artefact, RuleError, as_document, quantity, schema_of
+from dzdesign.core.display import ShownInNotebooks
 from dzdesign.core.dither import Dither
 from dzdesign.core.documents import sha256_of, to_json
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
-from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.identify.valve.quantity_types import Flow, Probability
 from dzdesign.identify.valve.side_model import SideModel
 from dzdesign.identify.valve.stated_options import StatedOptions

@@ -5,8 +5,8 @@ from dataclasses import asdict
 
 import numpy as np
 
+from dzdesign.core.display import NOT_CHECKED
 from dzdesign.core.recorded_units import RecordedUnits
-from dzdesign.core.verdicts import NOT_CHECKED
 from dzdesign.identify.plots.style import CYCLE
 from dzdesign.report.artefacts import Chain
 from dzdesign.report.figure import LIGHT, ReportFigure, label_ends, side_words, titled_axes, to_report_figure

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from dzdesign.core.display import NOT_CHECKED
 from dzdesign.core.recorded_units import RecordedUnits
-from dzdesign.core.verdicts import NOT_CHECKED
 from dzdesign.design.compensator import Compensator
 from dzdesign.report.artefacts import Chain, laws_of
 from dzdesign.report.figure import LIGHT, ReportFigure, legend_below, new_figure, to_report_figure

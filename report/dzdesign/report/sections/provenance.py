@@ -3,10 +3,10 @@
 from collections.abc import Callable, Iterator, Sequence
 
 from dzdesign.core.artefact_types import Artefact, schema_of
+from dzdesign.core.display import NOT_CHECKED, NOT_REQUIRED
 from dzdesign.core.documents import written_by
 from dzdesign.core.errors import InputError, and_more
 from dzdesign.core.recorded_units import RecordedUnits
-from dzdesign.core.verdicts import NOT_CHECKED, NOT_REQUIRED
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs import lines_of_tests
 from dzdesign.design.costs_at_tests import CostAtTest, costs_at_tests

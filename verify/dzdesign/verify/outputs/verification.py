@@ -6,8 +6,8 @@ from pathlib import Path
 
 from dzdesign.core.artefact_files import MANIFEST_NAME
 from dzdesign.core.artefact_types import THIS_TOOL, schema_of, to_json_bytes
+from dzdesign.core.display import ShownInNotebooks
 from dzdesign.core.errors import InputError, nearest, quoted
-from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import OutputManifest
 from dzdesign.design.pressure_inputs import not_covered
