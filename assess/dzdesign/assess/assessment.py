@@ -29,35 +29,28 @@ Voltage = Annotated[float, Meta(gt=0, le=1e9, extra_json_schema={"unit": "V"})]
 class Recording(SourceFile):
     """A recording and its set."""
 
-    set: Annotated[
-        Set, Meta(description="Whether the recording was taken without the compensator (before) or with it (after).")
-    ]
+    set: Set
+    """Whether the recording was taken without the compensator (before) or with it (after)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Request:
     """Options of the comparison."""
 
-    u_max_V: Annotated[Voltage, Meta(description="Full command of the recordings without the compensator.")]
-    after_u_max_V: Annotated[Voltage, Meta(description="Full command of the recordings with the compensator.")]
-    knee_window: Annotated[
-        tuple[Share, Share],
-        quantity("1", "Range in which the characteristic was taken as straight, as shares of the largest flow."),
-    ]
-    linearity_window: Annotated[
-        tuple[Share, Share], quantity("1", "Range in which linearity was assessed, as shares of full command.")
-    ]
-    reading_flow_L_min: Annotated[Flow | None, Meta(description="Reading flow of --reading-flow, if given as a flow.")]
-    reading_share: Annotated[
-        Share | None,
-        Meta(
-            description="Reading flow of --reading-flow, if given as a share of the largest flow.",
-            extra_json_schema={"unit": "1"},
-        ),
-    ]
-    same_pressure_within: Annotated[
-        Share, quantity("1", "Largest relative difference of two pressure drops that are compared with each other.")
-    ]
+    u_max_V: Voltage
+    """Full command of the recordings without the compensator."""
+    after_u_max_V: Voltage
+    """Full command of the recordings with the compensator."""
+    knee_window: Annotated[tuple[Share, Share], quantity("1")]
+    """Range in which the characteristic was taken as straight, as shares of the largest flow."""
+    linearity_window: Annotated[tuple[Share, Share], quantity("1")]
+    """Range in which linearity was assessed, as shares of full command."""
+    reading_flow_L_min: Flow | None
+    """Reading flow of --reading-flow, if given as a flow."""
+    reading_share: Annotated[Share | None, Meta(extra_json_schema={"unit": "1"})]
+    """Reading flow of --reading-flow, if given as a share of the largest flow."""
+    same_pressure_within: Annotated[Share, quantity("1")]
+    """Largest relative difference of two pressure drops that are compared with each other."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,24 +97,20 @@ class BeforeAfter:
 class PressureAssessment:
     """One side at one pressure drop, without and with the compensator."""
 
-    side: Annotated[Side, Meta(description="Side of the valve.")]
-    dp_MPa: Annotated[
-        PressureDrop | None,
-        Meta(description="Pressure drop of the recordings without the compensator, or with it if only those exist."),
-    ]
-    reading_flow_L_min: Annotated[Flow, Meta(description="Reading flow: the flow at which the dead zones are read.")]
-    rated_flow_L_min: Annotated[
-        Flow, Meta(description="Largest flow without the compensator, scaled to this pressure drop.")
-    ]
-    before: Annotated[
-        RampSet | None, Meta(description="Ramps without the compensator; null if there are none at this pressure drop.")
-    ]
-    after: Annotated[
-        RampSet | None, Meta(description="Ramps with the compensator; null if there are none at this pressure drop.")
-    ]
-    quantities: Annotated[
-        Mapping[str, BeforeAfter], Meta(description="Readings of each quantity, by the quantity's key.")
-    ]
+    side: Side
+    """Side of the valve."""
+    dp_MPa: PressureDrop | None
+    """Pressure drop of the recordings without the compensator, or with it if only those exist."""
+    reading_flow_L_min: Flow
+    """Reading flow: the flow at which the dead zones are read."""
+    rated_flow_L_min: Flow
+    """Largest flow without the compensator, scaled to this pressure drop."""
+    before: RampSet | None
+    """Ramps without the compensator; null if there are none at this pressure drop."""
+    after: RampSet | None
+    """Ramps with the compensator; null if there are none at this pressure drop."""
+    quantities: Mapping[str, BeforeAfter]
+    """Readings of each quantity, by the quantity's key."""
 
     def __post_init__(self) -> None:
         if self.before is None and self.after is None:

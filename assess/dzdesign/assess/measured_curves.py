@@ -29,19 +29,14 @@ class MeasuredBranch:
     On the negative side commands and flows count from zero down, as in valve.json.
     """
 
-    command_percent: Annotated[
-        Percents, quantity("%", "Commands of the points in ascending order, as a percentage of full command.")
-    ]
-    q_L_min: Annotated[Flows, quantity("L/min", "Flow at each point, scaled to the pressure drop at zero flow.")]
-    sample_command_percent: Annotated[
-        Percents,
-        quantity(
-            "%",
-            "Commands of single samples. The branch is divided into equal steps; the sample nearest to each "
-            "step is kept.",
-        ),
-    ]
-    sample_q_L_min: Annotated[Flows, quantity("L/min", "Flow of each single sample, scaled to the same pressure drop.")]
+    command_percent: Annotated[Percents, quantity("%")]
+    """Commands of the points in ascending order, as a percentage of full command."""
+    q_L_min: Annotated[Flows, quantity("L/min")]
+    """Flow at each point, scaled to the pressure drop at zero flow."""
+    sample_command_percent: Annotated[Percents, quantity("%")]
+    """Commands of single samples. The branch is divided into equal steps; the sample nearest to each step is kept."""
+    sample_q_L_min: Annotated[Flows, quantity("L/min")]
+    """Flow of each single sample, scaled to the same pressure drop."""
 
     def __post_init__(self) -> None:
         for commands, flows in (

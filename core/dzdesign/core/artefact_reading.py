@@ -196,7 +196,7 @@ def differences(stated: object, follows: object, *, rounding: float = 0.0, place
     Examples
     --------
     >>> [each.place for each in differences({"a": [1.0, 2.0]}, {"a": [1.0, 2.1], "b": 1})]
-    ['b', 'a[1]']
+    ['a[1]', 'b']
     >>> list(differences(1.0, 1.0 + 1e-9, rounding=1e-6)), len(list(differences(1.0, 1.0 + 1e-9)))
     ([], 1)
     """

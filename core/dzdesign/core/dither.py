@@ -23,11 +23,10 @@ SAME_FREQUENCY = Fraction(5, 100)
 class Dither:
     """A square wave around the drive."""
 
-    frequency_Hz: Annotated[float, quantity("Hz", "Frequency of the square wave.", ge=LOWEST_HZ, le=HIGHEST_HZ)]
-    peak: Annotated[
-        float,
-        quantity("1", "Amplitude: half the peak-to-peak height, as a share of full command.", gt=0, le=LARGEST_PEAK),
-    ]
+    frequency_Hz: Annotated[float, quantity("Hz", ge=LOWEST_HZ, le=HIGHEST_HZ)]
+    """Frequency of the square wave."""
+    peak: Annotated[float, quantity("1", gt=0, le=LARGEST_PEAK)]
+    """Amplitude: half the peak-to-peak height, as a share of full command."""
 
     def __post_init__(self) -> None:
         if not LOWEST_HZ <= self.frequency_Hz <= HIGHEST_HZ:

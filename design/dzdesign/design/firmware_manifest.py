@@ -50,10 +50,10 @@ class FirmwareManifest(Artefact):
     """Files of a firmware and their origin, as `dzdesign codegen` writes it."""
 
     FILE_NAME: ClassVar[str] = MANIFEST_NAME
-    schema: Annotated[Literal["dzdesign.firmware/1"], Meta(description="Name and version of this schema.")] = (
-        "dzdesign.firmware/1"
-    )
-    target: Annotated[Text, Meta(description="Microcontroller, as `codegen --list-targets` names it.")]
+    schema: Literal["dzdesign.firmware/1"] = "dzdesign.firmware/1"
+    """Name and version of this schema."""
+    target: Text
+    """Microcontroller, as `codegen --list-targets` names it."""
     calibration: Annotated[
         Calibration,
         Meta(
@@ -61,25 +61,18 @@ class FirmwareManifest(Artefact):
             f"the core receives, {BLOCK_FILE}."
         ),
     ]
-    law: Annotated[Text, Meta(description="Name of the law, as in compensator.json.")]
-    core: Annotated[tuple[Text, ...], Meta(description="Files that do not depend on the hardware.", min_length=1)]
-    board: Annotated[
-        tuple[Text, ...],
-        Meta(
-            description="Files for the user to complete. `codegen` keeps them if they were changed, and `verify` does "
-            "not check them."
-        ),
-    ]
-    origin: Annotated[FirmwareOrigin, Meta(description="Hashes of all files from which the firmware was made.")]
-    vectors: Annotated[
-        int,
-        Meta(
-            description="Number of test vectors in vectors.csv, set by `codegen --vectors`; 0 if there are none.",
-            ge=0,
-            le=99999,
-        ),
-    ]
-    files: Annotated[Mapping[Text, Sha256], Meta(description="SHA-256 of each generated file, by file name.")]
+    law: Text
+    """Name of the law, as in compensator.json."""
+    core: Annotated[tuple[Text, ...], Meta(min_length=1)]
+    """Files that do not depend on the hardware."""
+    board: tuple[Text, ...]
+    """Files for the user to complete. `codegen` keeps them if they were changed, and `verify` does not check them."""
+    origin: FirmwareOrigin
+    """Hashes of all files from which the firmware was made."""
+    vectors: Annotated[int, Meta(ge=0, le=99999)]
+    """Number of test vectors in vectors.csv, set by `codegen --vectors`; 0 if there are none."""
+    files: Mapping[Text, Sha256]
+    """SHA-256 of each generated file, by file name."""
 
 
 #: Characters of a setting in a sentence.

@@ -53,40 +53,22 @@ class LotCheck:
 class AboveCheck:
     """Check of the drive at zero command above the tested pressure drops; every count must be zero."""
 
-    choice: Annotated[Above, about("Choice of `design --above`.")]
-    certified_to_MPa: (
-        Annotated[
-            float,
-            quantity(
-                "MPa",
-                "Pressure drop up to which the drive is certified; null if nothing is certified above the tests.",
-                ge=0,
-                le=1000,
-            ),
-        ]
-        | None
-    )
-    released_from_MPa: (
-        Annotated[
-            float,
-            quantity(
-                "MPa", "Pressure drop from which the offset is released; null if it is not released.", ge=0, le=1000
-            ),
-        ]
-        | None
-    )
-    codes: Annotated[Count, about("Number of pressure-difference codes above the tests.")]
-    over_compensated: Annotated[Count, about("Number of certified codes whose drive lies above the continued bound.")]
-    smallest_margin_V: (
-        Annotated[
-            float, quantity("V", "Smallest margin of a drive above zero below that bound.", ge=-MOST_V, le=MOST_V)
-        ]
-        | None
-    )
-    rising: Annotated[Count, about("Number of codes with more drive than the certified offset of the last test.")]
-    not_released: Annotated[
-        Count, about("Number of codes with more than one unit of beta where the offset is released.")
-    ]
+    choice: Above
+    """Choice of `design --above`."""
+    certified_to_MPa: Annotated[float, quantity("MPa", ge=0, le=1000)] | None
+    """Pressure drop up to which the drive is certified; null if nothing is certified above the tests."""
+    released_from_MPa: Annotated[float, quantity("MPa", ge=0, le=1000)] | None
+    """Pressure drop from which the offset is released; null if it is not released."""
+    codes: Count
+    """Number of pressure-difference codes above the tests."""
+    over_compensated: Count
+    """Number of certified codes whose drive lies above the continued bound."""
+    smallest_margin_V: Annotated[float, quantity("V", ge=-MOST_V, le=MOST_V)] | None
+    """Smallest margin of a drive above zero below that bound."""
+    rising: Count
+    """Number of codes with more drive than the certified offset of the last test."""
+    not_released: Count
+    """Number of codes with more than one unit of beta where the offset is released."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -126,30 +108,26 @@ class InputCounts:
 class InputCheck(InputCounts):
     """Check of every input of one side; every count of faults must be zero."""
 
-    sign: Annotated[Sign, about("Sign of the command.")]
-    over_compensated: Annotated[
-        Count,
-        about("Number of pressure codes in the certified interval whose drive at zero command lies above the bound."),
-    ]
-    smallest_margin_V: Annotated[
-        float, quantity("V", "Smallest margin of the drive at zero command below the bound.", ge=-MOST_V, le=MOST_V)
-    ]
-    core_sha256: Annotated[Sha256, about("SHA-256 of the compiled C source.")]
-    object_sha256: Annotated[Sha256, about("SHA-256 of the object code that was tried.")]
-    outputs_hash: Annotated[
-        str,
-        Meta(
-            description="Hash of all compare values in order; it is the same on every processor.",
-            pattern="^[0-9a-f]{16}$", max_length=16,
-        ),
-    ]  # fmt: skip
-    pressure_pairs: Annotated[Count, about("Number of pairs of valid pressure codes, all of which were tried.")]
-    first_wrong: Annotated[str | None, about("First fault, in words.")]
-    above: Annotated[AboveCheck, about("Check above the tested pressure drops.")]
-    lot: Annotated[
-        LotCheck | None,
-        about("For a lot setting, the check of every valve against its own bounds; null for a single valve."),
-    ]
+    sign: Sign
+    """Sign of the command."""
+    over_compensated: Count
+    """Number of pressure codes in the certified interval whose drive at zero command lies above the bound."""
+    smallest_margin_V: Annotated[float, quantity("V", ge=-MOST_V, le=MOST_V)]
+    """Smallest margin of the drive at zero command below the bound."""
+    core_sha256: Sha256
+    """SHA-256 of the compiled C source."""
+    object_sha256: Sha256
+    """SHA-256 of the object code that was tried."""
+    outputs_hash: Annotated[str, Meta(pattern="^[0-9a-f]{16}$", max_length=16)]
+    """Hash of all compare values in order; it is the same on every processor."""
+    pressure_pairs: Count
+    """Number of pairs of valid pressure codes, all of which were tried."""
+    first_wrong: str | None
+    """First fault, in words."""
+    above: AboveCheck
+    """Check above the tested pressure drops."""
+    lot: LotCheck | None
+    """For a lot setting, the check of every valve against its own bounds; null for a single valve."""
 
     @property
     def side(self) -> Side:
@@ -168,41 +146,32 @@ class Evidence(Artefact):
     """The evidence about one firmware, as `dzdesign verify` writes it."""
 
     FILE_NAME: ClassVar[str] = "verification.json"
-    schema: Annotated[Literal["dzdesign.evidence/1"], about("Name and version of this schema.")] = "dzdesign.evidence/1"
-    target: Annotated[str, about("Microcontroller of the firmware.")]
-    changed_board_files: Annotated[
-        Names, about("Board files that were changed since generation; they are not checked.")
-    ]
-    user_files: Annotated[Names, about("Source and project files in the user's folder board/; they are not checked.")]
-    differing_files: Annotated[
-        Mapping[str, Sha256],
-        about("SHA-256, as verified, of every file that differs from the firmware's manifest or is missing from it."),
-    ]
-    board_not_compiled: Annotated[
-        str, about("Reason why the changed board files were not compiled; empty if they were, or none was changed.")
-    ]
-    holds: Annotated[
-        bool,
-        about("Whether every requirement holds. One that could not be checked does not hold."),
-    ] = field(init=False)
-    checks: Annotated[
-        tuple[Check, ...], Meta(description="Result of every requirement that was checked.", min_length=1)
-    ]
-    inputs: Annotated[
-        tuple[InputCheck, ...],
-        about("Check of all inputs of each side; empty if the core did not compile or the check could not run."),
-    ]
-    closed_loop: Annotated[ClosedLoopResult, about("Result of the ramps in closed loop with the generated C.")]
-    scenarios: Annotated[
-        tuple[ScenarioResult, ...], about("Results of the scenarios in closed loop, other than ramps.")
-    ]
-    current_loop: Annotated[
-        CurrentLoopResult | None,
-        about("Current loop of a current-controlled drive; null for a duty-controlled one, or if it did not run."),
-    ]
-    not_covered: Annotated[
-        Names, about("What the verdict does not cover, such as an identified side that the output does not drive.")
-    ] = ()
+    schema: Literal["dzdesign.evidence/1"] = "dzdesign.evidence/1"
+    """Name and version of this schema."""
+    target: str
+    """Microcontroller of the firmware."""
+    changed_board_files: Names
+    """Board files that were changed since generation; they are not checked."""
+    user_files: Names
+    """Source and project files in the user's folder board/; they are not checked."""
+    differing_files: Mapping[str, Sha256]
+    """SHA-256, as verified, of every file that differs from the firmware's manifest or is missing from it."""
+    board_not_compiled: str
+    """Reason why the changed board files were not compiled; empty if they were, or none was changed."""
+    holds: bool = field(init=False)
+    """Whether every requirement holds. One that could not be checked does not hold."""
+    checks: Annotated[tuple[Check, ...], Meta(min_length=1)]
+    """Result of every requirement that was checked."""
+    inputs: tuple[InputCheck, ...]
+    """Check of all inputs of each side; empty if the core did not compile or the check could not run."""
+    closed_loop: ClosedLoopResult
+    """Result of the ramps in closed loop with the generated C."""
+    scenarios: tuple[ScenarioResult, ...]
+    """Results of the scenarios in closed loop, other than ramps."""
+    current_loop: CurrentLoopResult | None
+    """Current loop of a current-controlled drive; null for a duty-controlled one, or if it did not run."""
+    not_covered: Names = ()
+    """What the verdict does not cover, such as an identified side that the output does not drive."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "holds", all(check.holds for check in self.all_checks))

@@ -29,24 +29,15 @@ class AtZero:
 
     side: Side
     dp_MPa: PressureDrop
-    unseen_below_L_min: Annotated[
-        Flow | None,
-        about(
-            "Flow below which the recordings show none, so that the plant's flow is unknown; null for a given plant."
-        ),
-    ]
-    leak_L_min: Annotated[Flow, about("Flow without drive at the end, which no compensator can stop.")]
-    allowed_at_zero_L_min: Annotated[
-        Flow | None,
-        about("Flow at zero command, leak included, that --zero-flow allows; null if only the leak is allowed."),
-    ]
-    q_zero_L_min: Annotated[
-        Flow,
-        about(
-            "Flow at zero command at the end, leak included. If a disturbance lasts and the whole scenario "
-            "is assessed, it is the largest flow at zero command."
-        ),
-    ]
+    unseen_below_L_min: Flow | None
+    """Flow below which the recordings show none, so that the plant's flow is unknown; null for a given plant."""
+    leak_L_min: Flow
+    """Flow without drive at the end, which no compensator can stop."""
+    allowed_at_zero_L_min: Flow | None
+    """Flow at zero command, leak included, that --zero-flow allows; null if only the leak is allowed."""
+    q_zero_L_min: Flow
+    """Flow at zero command at the end, leak included. If a disturbance lasts and the whole scenario is assessed, it is
+    the largest flow at zero command."""
 
     @property
     def q_beyond_L_min(self) -> float:
@@ -67,84 +58,75 @@ class PressureResult(AtZero):
     the reading flow.
     """
 
-    dead_zone_opening: Annotated[Share, about("Dead zone on opening without the compensator.")]
-    dead_zone_closing: Annotated[Share, about("Dead zone on closing without the compensator.")]
-    residual_opening: Annotated[Share, about("Dead zone on opening with the compensator.")]
-    residual_closing: Annotated[Share, about("Dead zone on closing with the compensator.")]
-    reading_flow_L_min: Annotated[
-        Flow, about("Reading flow: a stated flow at which dead zones are read in addition to the onset.")
-    ]
-    reading_opening_without: Annotated[Share, about("Command at the reading flow on opening without the compensator.")]
-    reading_closing_without: Annotated[Share, about("Command at the reading flow on closing without the compensator.")]
-    reading_opening: Annotated[Share, about("Command at the reading flow on opening with the compensator.")]
-    reading_closing: Annotated[Share, about("Command at the reading flow on closing with the compensator.")]
-    ideal_line: Annotated[
-        Share, about("Command at the reading flow on an ideal line from zero command to the largest flow.")
-    ]
-    q_zero_without_beta_L_min: Annotated[
-        Flow, about("Flow at zero command after closing with beta held at 1. It shows the effect of over-compensation.")
-    ]
-    flow_miss: Annotated[
-        float,
-        quantity(
-            "1",
-            "Largest deviation of the plant's flow without the compensator from the recorded one, over the "
-            "largest recorded flow. Both are averaged over 1 % of command.",
-            ge=0,
-            le=1e6,
-        ),
-    ]
-    flow_miss_at: Annotated[
-        float, quantity("1", "Command share at which this deviation is largest, the middle of 1 %.", ge=0, le=1)
-    ]
-    q_max_direct_L_min: Annotated[Flow, about("Largest flow without the compensator.")]
-    q_max_L_min: Annotated[Flow, about("Largest flow with the compensator.")]
+    dead_zone_opening: Share
+    """Dead zone on opening without the compensator."""
+    dead_zone_closing: Share
+    """Dead zone on closing without the compensator."""
+    residual_opening: Share
+    """Dead zone on opening with the compensator."""
+    residual_closing: Share
+    """Dead zone on closing with the compensator."""
+    reading_flow_L_min: Flow
+    """Reading flow: a stated flow at which dead zones are read in addition to the onset."""
+    reading_opening_without: Share
+    """Command at the reading flow on opening without the compensator."""
+    reading_closing_without: Share
+    """Command at the reading flow on closing without the compensator."""
+    reading_opening: Share
+    """Command at the reading flow on opening with the compensator."""
+    reading_closing: Share
+    """Command at the reading flow on closing with the compensator."""
+    ideal_line: Share
+    """Command at the reading flow on an ideal line from zero command to the largest flow."""
+    q_zero_without_beta_L_min: Flow
+    """Flow at zero command after closing with beta held at 1. It shows the effect of over-compensation."""
+    flow_miss: Annotated[float, quantity("1", ge=0, le=1e6)]
+    """Largest deviation of the plant's flow without the compensator from the recorded one, over the largest recorded
+    flow. Both are averaged over 1 % of command."""
+    flow_miss_at: Annotated[float, quantity("1", ge=0, le=1)]
+    """Command share at which this deviation is largest, the middle of 1 %."""
+    q_max_direct_L_min: Flow
+    """Largest flow without the compensator."""
+    q_max_L_min: Flow
+    """Largest flow with the compensator."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClosedLoopResult:
     """Ramps in closed loop with the generated C."""
 
-    plant: Annotated[Plant | None, about("Given plant; null if the recorded flow stood in for the valve.")]
-    plant_source: Annotated[str, about("Origin of the plant.")]
-    plant_sha256: Annotated[
-        Sha256 | None, about("SHA-256 of the plant's file; null if the recorded flow stood in for the valve.")
-    ]
-    dynamics: Annotated[
-        Plant | None,
-        about(
-            "Coil and spool that moved the recorded flow (`recorded` in valve.json), without their metering "
-            "edge. Null if a plant was given."
-        ),
-    ]
-    back_MPa: Annotated[
-        tuple[float, ...],
-        quantity("MPa", "Pressures downstream of the edge. The ramps use the highest, failing sensors use each."),
-    ]
-    pressures: Annotated[
-        tuple[PressureResult, ...],
-        about("Result for each side and tested pressure drop; empty if the closed loop did not run."),
-    ]
+    plant: Plant | None
+    """Given plant; null if the recorded flow stood in for the valve."""
+    plant_source: str
+    """Origin of the plant."""
+    plant_sha256: Sha256 | None
+    """SHA-256 of the plant's file; null if the recorded flow stood in for the valve."""
+    dynamics: Plant | None
+    """Coil and spool that moved the recorded flow (`recorded` in valve.json), without their metering edge. Null if a
+    plant was given."""
+    back_MPa: Annotated[tuple[float, ...], quantity("MPa")]
+    """Pressures downstream of the edge. The ramps use the highest, failing sensors use each."""
+    pressures: tuple[PressureResult, ...]
+    """Result for each side and tested pressure drop; empty if the closed loop did not run."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ScenarioResult(AtZero):
     """Result of one scenario other than ramps, at one pressure drop."""
 
-    name: Annotated[str, about("Name of the scenario.")]
-    back_MPa: Annotated[float, quantity("MPa", "Pressure downstream of the edge at the end.", ge=0, le=1000)]
-    q_peak_at_zero_L_min: Annotated[
-        Flow, about("Largest flow while the command was zero and the valve had already closed.")
-    ]
-    must_shut: Annotated[bool, about("Whether flow at zero command is a failure.")]
-    not_required: Annotated[
-        str,
-        about(
-            "Reason why it is not a failure: the firmware cannot detect the disturbance, or nothing was "
-            "declared. Empty if it is a failure."
-        ),
-    ]
-    figures: Annotated[Mapping[str, float], about("Other measured values; each name ends in its unit.")]
+    name: str
+    """Name of the scenario."""
+    back_MPa: Annotated[float, quantity("MPa", ge=0, le=1000)]
+    """Pressure downstream of the edge at the end."""
+    q_peak_at_zero_L_min: Flow
+    """Largest flow while the command was zero and the valve had already closed."""
+    must_shut: bool
+    """Whether flow at zero command is a failure."""
+    not_required: str
+    """Reason why it is not a failure: the firmware cannot detect the disturbance, or nothing was declared. Empty if it
+    is a failure."""
+    figures: Mapping[str, float]
+    """Other measured values; each name ends in its unit."""
 
     @property
     def is_load_step(self) -> bool:

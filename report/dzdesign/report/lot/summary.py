@@ -92,24 +92,22 @@ class SmallestMargin:
 class LotSettingSummary:
     """Setting that is safe for each calibrated valve."""
 
-    file: Annotated[
-        str, Meta(description="Name of the compensator's file.", pattern=r"^\w[\w.-]{0,99}$", max_length=100)
-    ]
-    sha256: Annotated[Sha256, about("SHA-256 of the compensator's file.")]
-    dp_MPa: Annotated[
-        Pressures, quantity("MPa", "Interval of the pressure drop on which it is certified for each valve.")
-    ]
-    untested: Annotated[
-        tuple[UntestedPressures, ...],
-        about("Valves that narrow the interval: they lack a test at a pressure drop where half of the lot has one."),
-    ]
-    dp_without_MPa: Annotated[
-        Pressures | None,
-        quantity("MPa", "Interval without the valves that narrow it; null if there are none, or no interval remains."),
-    ]
-    carrier: Annotated[str, about("Valve that the compensator contains: the one nearest to the lot's minimum.")]
-    binding: Annotated[Names, about("Valves that limit the offset.")]
-    checked: Annotated[SmallestMargin, about("Smallest margin below the bounds of all valves.")]
+    file: Annotated[str, Meta(pattern=r"^\w[\w.-]{0,99}$", max_length=100)]
+    """Name of the compensator's file."""
+    sha256: Sha256
+    """SHA-256 of the compensator's file."""
+    dp_MPa: Annotated[Pressures, quantity("MPa")]
+    """Interval of the pressure drop on which it is certified for each valve."""
+    untested: tuple[UntestedPressures, ...]
+    """Valves that narrow the interval: they lack a test at a pressure drop where half of the lot has one."""
+    dp_without_MPa: Annotated[Pressures | None, quantity("MPa")]
+    """Interval without the valves that narrow it; null if there are none, or no interval remains."""
+    carrier: str
+    """Valve that the compensator contains: the one nearest to the lot's minimum."""
+    binding: Names
+    """Valves that limit the offset."""
+    checked: SmallestMargin
+    """Smallest margin below the bounds of all valves."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -153,44 +151,37 @@ class LotSummary(Artefact):
     """The result of a lot of valves, as `dzdesign batch` writes it."""
 
     FILE_NAME: ClassVar[str] = SUMMARY_NAME
-    schema: Annotated[Literal["dzdesign.batch/1"], about("Name and version of this schema.")] = "dzdesign.batch/1"
-    valves: Annotated[int, Meta(description="Number of valves.", ge=1, le=10**9)]
+    schema: Literal["dzdesign.batch/1"] = "dzdesign.batch/1"
+    """Name and version of this schema."""
+    valves: Annotated[int, Meta(ge=1, le=10**9)]
+    """Number of valves."""
     calibrated: Annotated[Count, about("Number of valves with a firmware, verified if that was requested.")] = field(
         init=False
     )
-    failed: Annotated[tuple[FailedValve, ...], about("Valves that are not calibrated.")]
-    verified: Annotated[bool, about("Whether each firmware was also verified.")]
-    warnings: Annotated[Mapping[str, Names], about("Valves with each warning, by its code.")]
-    anomalies: Annotated[
-        Names,
-        about("Anomalies across valves that are individually in order, such as a recording that two valves share."),
-    ]
-    files: Annotated[Mapping[str, Sha256], about("SHA-256 of the table, by file name.")]
-    quantiles: Annotated[
-        Mapping[str, Quantiles],
-        about("Quantiles over the calibrated valves for each column of the table, if any valve has a value."),
-    ]
-    lot_setting: Annotated[
-        LotSettingSummary | None,
-        about("Setting that is safe for every calibrated valve; null if there is none."),
-    ]
-    why_no_lot_setting: Annotated[str | None, about("Reason why there is no such setting; null if there is one.")]
-    certified_of: Annotated[
-        Names,
-        about("What the certificates cover: the valve as recorded, alone or with the declared machine. Each that "
-              "occurs."),
-    ] = ()  # fmt: skip
-    firmware: Annotated[
-        LotFirmware | None,
-        about("Common firmware of valves with calibration blocks; null if each valve has its own firmware."),
-    ] = None
-    outputs: Annotated[
-        Mapping[str, LotOutput],
-        about("Other outputs of each valve, by target as listed by `codegen --list-targets`."),
-    ] = field(default_factory=dict)
-    recorded_units: Annotated[
-        RecordedUnits, about("Units of the recordings; the numbers in this file are in V and MPa.")
-    ] = AS_COMPUTED
+    failed: tuple[FailedValve, ...]
+    """Valves that are not calibrated."""
+    verified: bool
+    """Whether each firmware was also verified."""
+    warnings: Mapping[str, Names]
+    """Valves with each warning, by its code."""
+    anomalies: Names
+    """Anomalies across valves that are individually in order, such as a recording that two valves share."""
+    files: Mapping[str, Sha256]
+    """SHA-256 of the table, by file name."""
+    quantiles: Mapping[str, Quantiles]
+    """Quantiles over the calibrated valves for each column of the table, if any valve has a value."""
+    lot_setting: LotSettingSummary | None
+    """Setting that is safe for every calibrated valve; null if there is none."""
+    why_no_lot_setting: str | None
+    """Reason why there is no such setting; null if there is one."""
+    certified_of: Names = ()
+    """What the certificates cover: the valve as recorded, alone or with the declared machine. Each that occurs."""
+    firmware: LotFirmware | None = None
+    """Common firmware of valves with calibration blocks; null if each valve has its own firmware."""
+    outputs: Mapping[str, LotOutput] = field(default_factory=dict)
+    """Other outputs of each valve, by target as listed by `codegen --list-targets`."""
+    recorded_units: RecordedUnits = AS_COMPUTED
+    """Units of the recordings; the numbers in this file are in V and MPa."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "calibrated", self.valves - len(self.failed))

@@ -26,42 +26,33 @@ class ControllerStates:
 class CurrentCorner:
     """One coil at one supply: margins of the loop by its equations, and the behaviour of the C code."""
 
-    resistance_ohm: Annotated[float, quantity("ohm", "Resistance of the whole circuit.", ge=0, le=1e6)]
-    inductance_H: Annotated[float, quantity("H", "Inductance of the coil.", ge=0, le=1e6)]
-    supply_V: Annotated[float, quantity("V", "Supply voltage.", ge=0, le=1e6)]
-    phase_margin_deg: Annotated[float, quantity("deg", "Least phase margin over all currents.", ge=0, le=180)]
-    gain_margin: Annotated[float, quantity("1", "Least gain margin over all currents.", ge=0, le=1e6)]
-    limit_cycle_codes: Annotated[
-        float, quantity("codes", "Largest peak-to-peak swing of the settled mean current or its reading.", ge=0, le=1e6)
-    ]
-    steady_error_codes: Annotated[
-        float, quantity("codes", "Largest deviation of the mean reading from the set point.", ge=0, le=1e6)
-    ]
-    current_error_codes: Annotated[
-        float,
-        quantity(
-            "codes",
-            "Largest deviation of the mean current from the set point. It includes the rounding of codes "
-            "without noise and the ripple between samples.",
-            ge=0, le=1e6,
-        ),
-    ]  # fmt: skip
-    release_overshoot_codes: Annotated[
-        float,
-        quantity(
-            "codes", "Largest overshoot of the mean current beyond the set point on release from zero.", ge=0, le=1e6
-        ),
-    ]
-    rise_s: Annotated[
-        float | None,
-        quantity(
-            "s",
-            "Rise time from 10 to 90 % of the rated current; null if the supply can't carry it or it is not reached.",
-        ),
-    ]
-    least_rise_s: Annotated[float | None, quantity("s", "Rise time with the switch always on.")]
-    overshoot: Annotated[float | None, quantity("1", "Overshoot of that step, relative to its height.")]
-    faults: Annotated[Count, about("Fault bits DZ_CURRENT_... that the C code set; must be 0.")]
+    resistance_ohm: Annotated[float, quantity("ohm", ge=0, le=1e6)]
+    """Resistance of the whole circuit."""
+    inductance_H: Annotated[float, quantity("H", ge=0, le=1e6)]
+    """Inductance of the coil."""
+    supply_V: Annotated[float, quantity("V", ge=0, le=1e6)]
+    """Supply voltage."""
+    phase_margin_deg: Annotated[float, quantity("deg", ge=0, le=180)]
+    """Least phase margin over all currents."""
+    gain_margin: Annotated[float, quantity("1", ge=0, le=1e6)]
+    """Least gain margin over all currents."""
+    limit_cycle_codes: Annotated[float, quantity("codes", ge=0, le=1e6)]
+    """Largest peak-to-peak swing of the settled mean current or its reading."""
+    steady_error_codes: Annotated[float, quantity("codes", ge=0, le=1e6)]
+    """Largest deviation of the mean reading from the set point."""
+    current_error_codes: Annotated[float, quantity("codes", ge=0, le=1e6)]
+    """Largest deviation of the mean current from the set point. It includes the rounding of codes without noise and the
+    ripple between samples."""
+    release_overshoot_codes: Annotated[float, quantity("codes", ge=0, le=1e6)]
+    """Largest overshoot of the mean current beyond the set point on release from zero."""
+    rise_s: Annotated[float | None, quantity("s")]
+    """Rise time from 10 to 90 % of the rated current; null if the supply can't carry it or it is not reached."""
+    least_rise_s: Annotated[float | None, quantity("s")]
+    """Rise time with the switch always on."""
+    overshoot: Annotated[float | None, quantity("1")]
+    """Overshoot of that step, relative to its height."""
+    faults: Count
+    """Fault bits DZ_CURRENT_... that the C code set; must be 0."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
