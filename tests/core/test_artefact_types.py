@@ -26,7 +26,7 @@ from dzdesign.core.artefact_types import (
     quantity,
     to_json_bytes,
 )
-from dzdesign.core.documents import MOST_DIGITS
+from dzdesign.core.documents import DEEPEST, MOST_DIGITS
 from dzdesign.core.errors import InputError
 
 REMEDY = "measure it again"
@@ -256,11 +256,12 @@ TEXT = to_json_bytes(pump()).decode()
     ("content", "code"),
     [
         (TEXT.replace('"runs": 3', '"runs": 3, "runs": 4').encode(), "twice"),
-        (TEXT.replace('"p_MPa": 1.0', '"p_MPa": NaN').encode(), "Out of range"),
-        (TEXT.replace('"p_MPa": 1.0', '"p_MPa": -Infinity').encode(), "Out of range"),
+        (TEXT.replace('"p_MPa": 1.0', '"p_MPa": NaN').encode(), "NaN is not a number"),
+        (TEXT.replace('"p_MPa": 1.0', '"p_MPa": -Infinity').encode(), "-Infinity is not a number"),
         (TEXT.replace('"p_MPa": 1.0', '"p_MPa": 1e999').encode(), "Out of range"),
         (TEXT.replace('"runs": 3', f'"runs": {"3" * (MOST_DIGITS + 1)}').encode(), "digits"),
         (TEXT.replace('"runs": 3', f'"runs": {"3" * 5000}').encode(), "digits"),
+        (TEXT.replace('"runs": 3', f'"x": {"[" * DEEPEST}{"]" * DEEPEST}').encode(), "deep"),
         (TEXT.replace('"runs": 3', f'"x": {"[" * 100000}').encode(), "not JSON"),
         (TEXT.replace("A4", "A\u00e4").encode("latin-1"), "utf-8"),
         (TEXT.replace("A4", r"A\ud800").encode(), "surrogates"),

@@ -7,21 +7,8 @@ from typing import Annotated
 import pytest
 
 from dzdesign.core.errors import InputError
-from dzdesign.core.options import (
-    AnyPath,
-    Option,
-    Paths,
-    Table,
-    Text,
-    arguments_of,
-    number,
-    paths_of,
-    percent_range,
-    quantity,
-    read_options,
-    texts_of,
-    whole_number,
-)
+from dzdesign.core.option_readers import number, percent_range, quantity, whole_number
+from dzdesign.core.options import AnyPath, Option, Paths, Table, Text, arguments_of, paths_of, read_options, texts_of
 
 
 @dataclass(frozen=True)

@@ -96,19 +96,11 @@ class JsonText(ABC):
         """Return the text."""
 
 
-def quantity(
-    unit: str,
-    description: str | None = None,
-    *,
-    ge: float | None = None,
-    gt: float | None = None,
-    le: float | None = None,
-    lt: float | None = None,
-) -> Meta:
+def quantity(unit: str, description: str | None = None, **bounds: Any) -> Meta:
     """Return the metadata of a physical quantity, for an annotation.
 
     The unit is as a person writes it, such as ``L/min``; ``1`` of a ratio. The description is one sentence; a type of
-    several fields leaves it to them. Bounds (at least, above, at most, below) are only of an ``int`` or a ``float``;
+    several fields leaves it to them. Bounds (``ge``, ``gt``, ``le``, ``lt``) are only of an ``int`` or a ``float``;
     those of the items of a list stand in the annotation of the item.
 
     Examples
@@ -116,7 +108,6 @@ def quantity(
     >>> quantity("MPa", "Nominal pressure drop.", ge=0, le=200).le
     200
     """
-    bounds: dict[str, Any] = {"ge": ge, "gt": gt, "le": le, "lt": lt}
     return Meta(description=description, extra_json_schema={"unit": unit}, **bounds)
 
 

@@ -27,6 +27,9 @@ MOST_RECORDING = 1 << 30
 MOST_PIPED = 1 << 28
 #: Git takes a file for binary that has a zero in so many octets at its beginning.
 TEXT_SHOWS = 8000
+#: Lists and objects in one another; dzdesign's own artefacts have eight. Beyond some hundred, what reads or prints the
+#: value would end in the interpreter's own limit, at a depth that depends on who called.
+DEEPEST = 32
 #: Digits of a whole number: a double holds no more, and a part of a fraction has some sixty.
 MOST_DIGITS = 300
 #: Largest TOML file and longest row, octets: ten times what people write. The parser keeps the beginning of every part
@@ -198,7 +201,10 @@ def parse_document(content: bytes, source: str, schemas: tuple[str, ...]) -> dic
     try:
         # JSON in UTF-16, or after a byte order mark, would be read here and stumbled over later.
         text = content.decode("utf-8")
-        document: dict[str, Any] = json.loads(text, parse_int=_whole_number, object_pairs_hook=_unique_keys)
+        document: dict[str, Any] = json.loads(
+            text, parse_int=_whole_number, parse_constant=_no_number, object_pairs_hook=_unique_keys
+        )
+        _refuse_deep(document)
         json.dumps(document, ensure_ascii=False, allow_nan=False).encode()
     except (ValueError, RecursionError) as error:
         raise InputError(f"'{source}' is not JSON ({error}); expected an artefact of schema {expected}") from error
@@ -209,6 +215,19 @@ def parse_document(content: bytes, source: str, schemas: tuple[str, ...]) -> dic
     command = next((by for schema, by in commands.items() if by and family_of(found) == family_of(schema)), None)
     remedy = f"make it again with `{command}` of this version" if command else "give another file"
     raise InputError(f"'{source}' has the schema {quoted(found)}, expected {expected}; {remedy}")
+
+
+def _refuse_deep(document: Any) -> None:
+    level = [document]
+    for _ in range(DEEPEST):
+        values = [value for value in level if isinstance(value, dict | list)]
+        level = [item for value in values for item in (value.values() if isinstance(value, dict) else value)]
+    if level:
+        raise ValueError(f"it nests lists and objects more than {DEEPEST} deep")
+
+
+def _no_number(word: str) -> float:
+    raise ValueError(f"{word} is not a number of JSON")
 
 
 def _whole_number(text: str) -> int:

@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, replace
 from string import Formatter
-from typing import TYPE_CHECKING, Annotated, Any, Literal, final, overload
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, final
 
 from msgspec import UNSET, Meta, UnsetType
 
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 #: Characters of a unit: of a bare number, such as a duty cycle, it is the label of its column.
 LONGEST_UNIT = 40
+Number = TypeVar("Number", float, "np.ndarray")
 UnitName = Annotated[str, Meta(description="Name of the unit.", min_length=1, max_length=LONGEST_UNIT)]
 
 
@@ -190,11 +191,7 @@ class RecordedUnits:
             return "V" if unit == "dV" else unit
         return kind.label.format(u=self.command.unit, dp=self.pressure.unit, q=self.flow.unit, i=self._current.unit)
 
-    @overload
-    def convert(self, value: float, unit: str) -> float: ...
-    @overload
-    def convert(self, value: "np.ndarray", unit: str) -> "np.ndarray": ...
-    def convert(self, value: Any, unit: str) -> Any:
+    def convert(self, value: Number, unit: str) -> Number:
         """Return a number or an array of the unit in which it is computed in that of the recordings, for a plot."""
         kind = _KINDS[unit]
         if self._as_computed(kind):

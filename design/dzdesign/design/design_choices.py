@@ -11,18 +11,8 @@ from fractions import Fraction
 from typing import Annotated, Any, Literal, get_args
 
 from dzdesign.core.errors import InputError, quoted
-from dzdesign.core.options import (
-    CONNECTIONS,
-    DRIVE,
-    LAW,
-    MACHINE,
-    Option,
-    Text,
-    arguments_of,
-    quantity,
-    quantity_range,
-    with_tolerance,
-)
+from dzdesign.core.option_readers import quantity, quantity_range, with_tolerance
+from dzdesign.core.options import CONNECTIONS, DRIVE, LAW, MACHINE, Option, Text, arguments_of
 from dzdesign.core.units import parse_quantity
 from dzdesign.derivation.laws import LAW_NAMES
 from dzdesign.identify.constants import L_MIN

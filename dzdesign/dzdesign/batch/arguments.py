@@ -3,7 +3,8 @@
 from dataclasses import KW_ONLY, dataclass
 from typing import Annotated
 
-from dzdesign.core.options import AnyPath, Option, Text, whole_number
+from dzdesign.core.option_readers import whole_number
+from dzdesign.core.options import AnyPath, Option, Text
 from dzdesign.design.design_choices import DesignChoices
 from dzdesign.stages.generate import OutputChoices
 from dzdesign.stages.identify import IdentifyChoices

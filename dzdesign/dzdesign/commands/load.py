@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from dzdesign.core.errors import DzdesignError, InputError, RequirementError, one_line, quoted
-from dzdesign.core.options import AnyPath, Option, Text, number, read_options
+from dzdesign.core.option_readers import number
+from dzdesign.core.options import AnyPath, Option, Text, read_options
 from dzdesign.serial_port import PortLine, open_port
 from dzdesign.terminal.page import print_json
 from dzdesign.terminal.progress import say, with_bar

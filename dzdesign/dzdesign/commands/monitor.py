@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from dzdesign.core.artefact_files import check_file_may_be_written
 from dzdesign.core.errors import InputError, one_line
-from dzdesign.core.options import AnyPath, Option, Text, number, read_options
+from dzdesign.core.option_readers import number
+from dzdesign.core.options import AnyPath, Option, Text, read_options
 from dzdesign.serial_port import open_port
 from dzdesign.terminal.page import print_json
 from dzdesign.terminal.progress import say

@@ -27,32 +27,24 @@ Range = tuple[Number, Number]
 class Outcome:
     """One value of dzdesign for a number of the paper."""
 
-    by: Annotated[
-        Driver, Meta(description="Source of the value: the bare valve, the paper's law, or the whole product.")
-    ]
-    hysteresis_V: Annotated[float, quantity("V", "Assumed hysteresis of the valve.", ge=0, le=1e6)] = 0.0
-    value: Annotated[
-        Number | None, Meta(description="Value of dzdesign, in the number's unit; null if it is not compared.")
-    ]
-    difference: Annotated[
-        Number | None, Meta(description="Value of dzdesign minus the printed one; null if no number is printed.")
-    ]
-    allowed: Annotated[
-        Range | None,
-        Meta(description="Range that the printed digits and a measurement error allow; null if there are no digits."),
-    ]
-    reason: Annotated[
-        str, Meta(description="Reason for a value outside the range; empty if it agrees or the reason is unknown.")
-    ] = ""
-    explained: Annotated[
-        Range | None, Meta(description="Range that the reason explains; null if there is no reason.")
-    ] = None
-    agrees: Annotated[
-        bool | None, Meta(description="Whether the value lies in the allowed range; null if there are no digits.")
-    ] = field(init=False)
-    accounted: Annotated[
-        bool, Meta(description="Whether the value agrees, or misses by no more than its reason explains.")
-    ] = field(init=False)
+    by: Driver
+    """Source of the value: the bare valve, the paper's law, or the whole product."""
+    hysteresis_V: Annotated[float, quantity("V", ge=0, le=1e6)] = 0.0
+    """Assumed hysteresis of the valve."""
+    value: Number | None
+    """Value of dzdesign, in the number's unit; null if it is not compared."""
+    difference: Number | None
+    """Value of dzdesign minus the printed one; null if no number is printed."""
+    allowed: Range | None
+    """Range that the printed digits and a measurement error allow; null if there are no digits."""
+    reason: str = ""
+    """Reason for a value outside the range; empty if it agrees or the reason is unknown."""
+    explained: Range | None = None
+    """Range that the reason explains; null if there is no reason."""
+    agrees: bool | None = field(init=False)
+    """Whether the value lies in the allowed range; null if there are no digits."""
+    accounted: bool = field(init=False)
+    """Whether the value agrees, or misses by no more than its reason explains."""
 
     def __post_init__(self) -> None:
         agrees = _within(self.value, self.allowed)
@@ -69,37 +61,29 @@ def _within(value: float | None, limits: Range | None) -> bool | None:
 class PaperNumber:
     """One number of the paper, beside the values of dzdesign."""
 
-    valve: Annotated[str, Meta(description="Valve of the paper to which the number belongs.")]
-    quantity: Annotated[str, Meta(description='Quantity; "without" and "with" refer to the compensator.')]
-    unit: Annotated[str, Meta(description="Unit of all values of this number.")]
-    dp_MPa: Annotated[float | None, quantity("MPa", "Pressure drop of the number.")]
-    published: Annotated[str, Meta(description="Number as printed.")]
-    kind: Annotated[
-        Kind,
-        Meta(
-            description="Whether the number was used in a fit, is predicted, is taken from the paper, or has no digits "
-            "to compare."
-        ),
-    ]
-    outcomes: Annotated[
-        tuple[Outcome, ...], Meta(description="Values of the bare valve, or of the paper's law and the product.")
-    ]
-    tolerance: Annotated[str, Meta(description="Components of the allowed ranges; empty if there are none.")]
-    why: Annotated[str, Meta(description="Background of the number, whether it agrees or not.")]
-    agrees: Annotated[
-        bool | None,
-        Meta(
-            description="Whether every outcome without an assumed hysteresis agrees; null if the number has no digits "
-            "or is given."
-        ),
-    ] = field(init=False)
-    holds: Annotated[
-        bool | None,
-        Meta(
-            description="Whether each outcome agrees or misses by no more than its reason explains. It is also false "
-            "if a given number or a statement in words is contradicted. Null as for `agrees`."
-        ),
-    ] = field(init=False)
+    valve: str
+    """Valve of the paper to which the number belongs."""
+    quantity: str
+    """Quantity; "without" and "with" refer to the compensator."""
+    unit: str
+    """Unit of all values of this number."""
+    dp_MPa: Annotated[float | None, quantity("MPa")]
+    """Pressure drop of the number."""
+    published: str
+    """Number as printed."""
+    kind: Kind
+    """Whether the number was used in a fit, is predicted, is taken from the paper, or has no digits to compare."""
+    outcomes: tuple[Outcome, ...]
+    """Values of the bare valve, or of the paper's law and the product."""
+    tolerance: str
+    """Components of the allowed ranges; empty if there are none."""
+    why: str
+    """Background of the number, whether it agrees or not."""
+    agrees: bool | None = field(init=False)
+    """Whether every outcome without an assumed hysteresis agrees; null if the number has no digits or is given."""
+    holds: bool | None = field(init=False)
+    """Whether each outcome agrees or misses by no more than its reason explains. It is also false if a given number or
+    a statement in words is contradicted. Null as for `agrees`."""
 
     def __post_init__(self) -> None:
         compared = [one for one in self.outcomes if one.agrees is not None]

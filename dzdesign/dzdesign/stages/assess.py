@@ -4,18 +4,8 @@ from dataclasses import KW_ONLY, dataclass
 from typing import TYPE_CHECKING, Annotated
 
 from dzdesign.core.errors import InputError
-from dzdesign.core.options import (
-    FIT,
-    RECORDINGS,
-    AnyPath,
-    Option,
-    Paths,
-    Table,
-    Text,
-    percent_range,
-    quantity,
-    read_options,
-)
+from dzdesign.core.option_readers import percent_range, quantity
+from dzdesign.core.options import FIT, RECORDINGS, AnyPath, Option, Paths, Table, Text, read_options
 from dzdesign.core.units import parse_quantity
 from dzdesign.stages.recordings import (
     RampArguments,

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 from dzdesign.core.artefact_files import check_file_may_be_written, write_file
 from dzdesign.core.documents import read_bytes
 from dzdesign.core.errors import InputError, RequirementError
-from dzdesign.core.options import AnyPath, Option, Text, percent, quantity
+from dzdesign.core.option_readers import percent, quantity
+from dzdesign.core.options import AnyPath, Option, Text
 from dzdesign.stages.given_compensator import given_compensator, refuse_underived
 
 if TYPE_CHECKING:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from dzdesign.core.dither import read_dithered
 from dzdesign.core.errors import InputError, quoted
+from dzdesign.core.option_readers import number, percent, quantity
 from dzdesign.core.options import (
     FIT,
     METER,
@@ -19,10 +20,7 @@ from dzdesign.core.options import (
     Text,
     Texts,
     arguments_of,
-    number,
     paths_of,
-    percent,
-    quantity,
 )
 from dzdesign.stages.recording_order import in_order, stated_order
 from dzdesign.stages.recording_parts import parts_of

@@ -16,6 +16,7 @@ from dzdesign.core.artefact_files import (
     write_files,
 )
 from dzdesign.core.errors import InputError, nearest, neighbour, quoted
+from dzdesign.core.option_readers import percent_range, quantity, whole_number, with_tolerance
 from dzdesign.core.options import (
     FIT,
     METER,
@@ -27,11 +28,7 @@ from dzdesign.core.options import (
     Text,
     Texts,
     paths_of,
-    percent_range,
-    quantity,
     read_options,
-    whole_number,
-    with_tolerance,
 )
 from dzdesign.core.units import parse_quantity
 from dzdesign.terminal.progress import say, stage_progress, with_bar

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from dzdesign.core.errors import InputError
-from dzdesign.core.options import with_tolerance
+from dzdesign.core.option_readers import with_tolerance
 from dzdesign.identify.identification import identify
 from dzdesign.identify.knees.meter_lag import LONGEST_UNKNOWN, softness_of_filter
 from dzdesign.identify.options import IdentifyOptions

@@ -7,7 +7,7 @@ from math import ceil, floor
 
 from dzdesign.codegen.amplifier.device import Device, Parameter
 from dzdesign.core.errors import InputError
-from dzdesign.core.options import percent, quantity
+from dzdesign.core.option_readers import percent, quantity
 from dzdesign.core.recorded_units import shown_in
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.fixed_offset import (

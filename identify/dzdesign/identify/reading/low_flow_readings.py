@@ -10,7 +10,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from dzdesign.core.errors import InputError, quoted
-from dzdesign.core.options import Texts, percent
+from dzdesign.core.option_readers import percent
+from dzdesign.core.options import Texts
 from dzdesign.core.units import parse_quantity
 from dzdesign.identify.constants import L_MIN, LARGEST_DP, MPA, SMALLEST_DP
 from dzdesign.identify.valve.low_flow import Branch, LowFlow

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from dzdesign.core.documents import read_bytes
 from dzdesign.core.errors import InputError, quoted
-from dzdesign.core.options import percent
+from dzdesign.core.option_readers import percent
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import OutputManifest
 from dzdesign.design.signals import SIDE_NAMES
