@@ -1,8 +1,8 @@
 """Artefacts as types: one frozen dataclass is read from JSON, written as JSON and described as JSON Schema by itself.
 
 An artefact is declared once. The annotation of a field says its type, unit and bounds, the docstring below the field
-its meaning (or a ``description`` in the annotation); ``__post_init__`` holds the rules between fields.
-`dzdesign.core.artefact_reading` reads it and describes it.
+its meaning, or a ``description`` in the annotation where all of it fits on that line; ``__post_init__`` holds the rules
+between fields. `dzdesign.core.artefact_reading` reads it and describes it.
 
 Examples
 --------
@@ -14,7 +14,8 @@ Examples
 ...
 ...     FILE_NAME: ClassVar[str] = "supply.json"
 ...     schema: Literal["dzdesign.supply/1"] = "dzdesign.supply/1"
-...     p_MPa: Annotated[float, quantity("MPa", "Set pressure.", ge=0, le=50)]
+...     p_MPa: Annotated[float, quantity("MPa", ge=0, le=50)]
+...     "Set pressure."
 >>> to_json_bytes(Supply(tool=THIS_TOOL, made_from=(), p_MPa=21.0))[:32]
 b'{\\n "schema": "dzdesign.supply/1"'
 """
