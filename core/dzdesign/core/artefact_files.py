@@ -64,9 +64,10 @@ def _nearest_folder(folder: Path, option: str) -> Path:
     """Return a folder, or the one above it that is there; refuse what is a file, or a name that can't be one."""
     with contextlib.suppress(FileNotFoundError, NotADirectoryError):
         os.lstat(folder)
-    nearest = next(one for one in (folder, *folder.absolute().parents) if one.exists())
+    nearest = next(one for one in (folder, *folder.absolute().parents) if os.path.lexists(one))
     if not nearest.is_dir():
-        raise InputError(f"'{nearest}' is a file, expected a folder to write into; choose another name with {option}")
+        kind = "a file" if nearest.exists() else "a link to nothing"
+        raise InputError(f"'{nearest}' is {kind}, expected a folder to write into; choose another name with {option}")
     return nearest
 
 
@@ -186,10 +187,12 @@ def check_inside(folder: Path, names: Iterable[str], source: str) -> None:
         found = os.path.realpath(path)
         if os.path.commonpath([home, found]) != home:
             raise InputError(f"'{path}' is a link to a place outside of '{folder}'; put the file itself there")
-        if os.path.lexists(path) and not (os.path.isfile(path) and os.path.getsize(path) <= MOST_DOCUMENT):
+        if os.path.lexists(path) and not os.path.isfile(path):
+            raise InputError(f"'{path}', which {source} names, is not a file; make the folder again")
+        if os.path.isfile(path) and os.path.getsize(path) > MOST_DOCUMENT:  # whoever looks at it reads it whole
             raise InputError(
-                f"'{path}', which {source} names, is not a file, or larger than {MOST_DOCUMENT >> 20} MiB, which no "
-                "file of dzdesign is; make the folder again"
+                f"'{path}' is larger than {MOST_DOCUMENT >> 20} MiB, which no file of dzdesign is; make the folder "
+                "again"
             )
 
 

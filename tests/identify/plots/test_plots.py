@@ -339,13 +339,13 @@ class TestBadFolder:
     @pytest.mark.parametrize(
         ("plots", "said"),
         [
-            ("a.csv", "'a.csv' is not a folder"),
-            ("a.csv/plots", "a.csv' is not a folder"),
-            ("loose", "'loose' is not a folder"),
+            ("a.csv", "'a.csv' is a file"),
+            ("a.csv/plots", "a.csv' is a file"),
+            ("loose", "'loose' is a link"),
             ("", "--plots is empty"),
             ("valve.json", "where -o puts a file"),
             ("valve.json/plots", "where -o puts a file"),
-            ("no\0name", "can't be written into"),
+            ("no\0name", "can't be written"),
         ],
     )
     def test_it_is_refused_in_a_sentence_before_anything_is_done(self, bench, capsys, plots, said):
