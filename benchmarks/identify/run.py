@@ -24,6 +24,7 @@ from curve_choice import print_curve_choice  # noqa: E402
 from curve_premises import print_curve_premises  # noqa: E402
 from measured import print_measured  # noqa: E402
 from meters import print_meters  # noqa: E402
+from ramp_families import print_ramp_families  # noqa: E402
 from ramp_series import print_ramp_series  # noqa: E402
 from random_valves import print_random_valves  # noqa: E402
 from reading import print_reading  # noqa: E402
@@ -41,6 +42,7 @@ PARTS = {
     "over-compensation": (print_over_compensation, 203),
     "residual": (print_residual, 303),
     "between-ramps": (print_between_ramps, 808),
+    "ramp-families": (print_ramp_families, 848),
     "ramp-series": (print_ramp_series, 818),
     "series-gain": (print_series_gain, 828),
     "stops": (print_stops, 909),
