@@ -75,9 +75,11 @@ def test_one_ramp_off_is_set_aside_and_named(ramp, off):
         ramps = scattered(seed)
         ramps.y[ramp] += off
         found.append(measured(ramps))
-    assert all([each.ramp for each in one.set_aside][:1] == [ramp] and one.unlike is None for one in found)
-    assert all(np.sign(one.set_aside[0].distance) == np.sign(off) for one in found)
-    assert all(not one.kept[ramp] and one.kept.sum() == 15 - len(one.set_aside) for one in found)
+    # Where the other two of its knot happen to differ, all three may be taken for a wider scatter.
+    told = [one for one in found if one.unlike is None]
+    assert len(told) >= 18 and all([each.ramp for each in one.set_aside][:1] == [ramp] for one in told)
+    assert all(np.sign(one.set_aside[0].distance) == np.sign(off) for one in told)
+    assert all(not one.kept[ramp] and one.kept.sum() == 15 - len(one.set_aside) for one in told)
 
 
 def test_of_two_ramps_that_differ_the_lower_one_stays():
@@ -94,8 +96,8 @@ def test_a_knot_that_scatters_more_keeps_a_variance_of_its_own():
     told = [each for each in found if each.unlike]
     assert len(told) >= 40 and all(each.unlike.knot == 0 and each.unlike.degrees == 2 for each in told)
     assert all(each.variance < (6e-3) ** 2 < each.unlike.variance for each in told)
-    # Where one of the three explains it, that one is set aside: then two are left that differ as the others do.
-    assert all(each.set_aside for each in found if not each.unlike)
+    # Else one of the three explains it, for the other two are alike; a scatter that is small by chance is left.
+    assert sum(bool(each.set_aside) for each in found if not each.unlike) >= 95 - len(told)
 
 
 def test_noise_that_is_known_to_differ_is_no_scatter():
