@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dzdesign.core.errors import InputError
 from dzdesign.identify.fit.certificate import (
     NoCurveAgreesError,
     certify,
@@ -17,9 +18,10 @@ from dzdesign.identify.fit.certificate import (
     critical,
     known_rows,
     largest_offsets,
+    prove,
     running_minimum,
 )
-from dzdesign.identify.fit.curve_class import class_of_bends, find_class, one_way
+from dzdesign.identify.fit.curve_class import class_of_bends, find_class, lack_of_fit, one_way
 from dzdesign.identify.fit.ramp_model import Ramps
 from dzdesign.identify.fit.scatter import measure_scatter
 
@@ -64,7 +66,7 @@ def programmes_of(found):
     for curves in one_way(found.curves):
         for known in found.data:
             with suppress(NoCurveAgreesError):
-                yield curves, known, *largest_offsets(curves, known)
+                yield curves, known, largest_offsets(curves, known)
 
 
 @pytest.fixture(scope="module")
@@ -72,9 +74,9 @@ def refereed():
     """The programmes of all cases, by the product and by cvxpy in a process of its own."""
     programmes, ours = [], []
     for case in CASES:
-        for curves, known, offsets, _ in programmes_of(certified(*case)):
+        for curves, known, proof in programmes_of(certified(*case)):
             programmes.append(known_rows(curves, known))
-            ours.append(offsets)
+            ours.append(proof.offsets)
     done = subprocess.run(
         [sys.executable, Path(__file__).with_name("referee.py")], input=pickle.dumps(programmes), capture_output=True,
         check=True, timeout=240,
@@ -91,15 +93,19 @@ def test_no_threshold_that_data_and_premise_allow_lies_below_and_no_larger_offse
 def test_the_multipliers_prove_the_offsets_without_a_solver(case):
     every = list(programmes_of(certified(*case)))
     assert every
-    for curves, known, offsets, multipliers in every:
+    for curves, known, proof in every:
         left, right = known_rows(curves, known)
-        assert multipliers.min() >= 0
-        miss = np.abs(multipliers @ left - np.eye(len(offsets))).sum(axis=1)
-        assert miss.max() < 1e-6
-        # From a zero that all rows share: what the proof misses counts with what thresholds differ by.
-        base = known.floor.max()
-        proved = base + multipliers @ (right - base * left.sum(axis=1))
-        assert np.all(offsets <= proved + 1e-9) and np.all(offsets >= proved - 2e-6)
+        base = known.floor.max()  # from a zero that all rows share, what a proof misses counts with what is left
+        for at, (rows, multipliers, offset) in enumerate(
+            zip(proof.rows, proof.multipliers, proof.offsets, strict=True)
+        ):
+            assert multipliers.min() > 0
+            miss = multipliers @ left[rows]
+            miss[at] -= 1
+            assert np.abs(miss).sum() < 1e-6
+            proved = base + multipliers @ (right - base * left.sum(axis=1))[rows]
+            assert proved - 2e-6 <= offset <= proved + 1e-9
+        np.testing.assert_allclose(prove(curves, known, proof.rows).offsets, proof.offsets, atol=1e-7)
 
 
 def test_data_that_contradict_a_premise_are_refused():
@@ -109,12 +115,12 @@ def test_data_that_contradict_a_premise_are_refused():
             certify(scatter, find_class(scatter, curve=curve, curvature=None, direction=direction))
 
 
-def test_a_multiplier_that_is_off_proves_nothing():
+def test_a_proof_that_lacks_a_row_proves_nothing():
     found = certified(*CASES[0])
-    left, _ = known_rows(found.curves, found.data[0])
-    _, multipliers = largest_offsets(found.curves, found.data[0])
-    multipliers[3, np.argmax(multipliers[3])] *= 1.01
-    assert np.abs(multipliers @ left - np.eye(len(multipliers)))[3].sum() > 1e-3
+    rows = [each.copy() for each in found.proofs[0].rows]
+    rows[3] = rows[3][found.proofs[0].multipliers[3] < found.proofs[0].multipliers[3].max()]
+    with pytest.raises(InputError, match="miss their proof"):
+        prove(found.curves, found.data[0], rows)
 
 
 @pytest.mark.parametrize("curve", [(None, None), ("smooth", 0.1), ("line", None)])
@@ -208,3 +214,33 @@ def test_of_one_test_the_critical_value_is_student_s():
     for degrees, law in ((2.0, t(2)), (8.0, t(8)), (np.inf, norm)):
         found = critical(np.full((1, 3), 1 / 3), degrees, 1.0, 0.0075)
         assert found == pytest.approx(law.isf(0.0075), rel=0.02)
+
+
+def test_what_all_ramps_have_in_common_is_taken_off_once():
+    ramps = ramps_of("line", drift=True)
+    free, shared = (scatter_of(each) for each in (ramps, replace(ramps, shared=0.02)))
+    bounds = [certify(each, find_class(each, curve=None, curvature=None)).bound for each in (free, shared)]
+    np.testing.assert_allclose(bounds[0] - bounds[1], 0.02, atol=3e-6)
+
+
+def test_a_threshold_that_may_fall_is_not_certified_above_the_tests():
+    scatter = scatter_of(ramps_of("line"))
+    for direction, certified_above in ((-1, False), (1, True)):
+        rising = scatter_of(replace(ramps_of("line"), y=10 - ramps_of("line").y)) if direction > 0 else scatter
+        found = certify(rising, find_class(rising, curve="monotone", curvature=None, direction=direction))
+        above = continue_above(rising, found)
+        assert above.certified == certified_above
+        assert (above.bound[-1] < above.bound[0] - 1) == (not certified_above)
+
+
+@pytest.mark.parametrize(
+    ("curve", "curvature", "shape"), [("line", None, "kink"), ("smooth", 0.005, "U"), ("monotone", None, "U")]
+)
+def test_tests_that_contradict_a_premise_say_so_and_others_do_not(curve, curvature, shape):
+    def p_values(name):
+        scatters = [scatter_of(ramps_of(name, scatter=5e-3, seed=seed)) for seed in range(60)]
+        return np.array([lack_of_fit(each, curve=curve, curvature=curvature) for each in scatters])
+
+    # Of 60 true ones 0.6 lie below 1 %.
+    assert np.sum(p_values("line") < 0.01) <= 4
+    assert np.mean(p_values(shape) < 0.01) > 0.9

@@ -107,3 +107,13 @@ def test_noise_that_is_known_to_differ_is_no_scatter():
         y = 5 + se * rng.standard_normal(DP.size)
         found += find_unlike_knot(fit_ramp_model(Ramps(dp_MPa=DP, y=y, se=se), share_knots=False)) is not None
     assert found <= 3
+
+
+def test_ramps_of_two_groups_all_count():
+    """None is set aside, and the scatter reaches from group to group."""
+    dp = np.repeat(np.arange(1.0, 6.0), 7)
+    ramps = scattered(1, sd=1e-3, dp=dp)
+    ramps.y[0] -= 0.5
+    assert measured(ramps).set_aside
+    found = measure_scatter(ramps, declared=None, assumed=25e-3, least=0.25)
+    assert not found.set_aside and found.variance >= 0.25**2

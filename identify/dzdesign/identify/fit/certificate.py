@@ -12,6 +12,7 @@ of their errors has a distribution that is simulated once, with a fixed seed; th
 independent of it, is integrated.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -65,12 +66,23 @@ class DataSet:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Proof:
-    """Multipliers of one offset: rows that they belong to, the values, and which state and direction the rows have."""
+    """The offsets of one state and direction, V (N,), with the rows of each that matter and their multipliers."""
 
     state: float
     direction: int
-    rows: np.ndarray
-    multipliers: np.ndarray
+    offsets: np.ndarray
+    rows: tuple[np.ndarray, ...]
+    multipliers: tuple[np.ndarray, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Criticals:
+    """Standard deviations between the sums and their floors and roofs; those of a knot that scatters unlike apart."""
+
+    floor: float
+    roof: float
+    floor_unlike: float | None = None
+    roof_unlike: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,10 +93,8 @@ class Certificate:
     data: tuple[DataSet, ...]
     #: V.
     bound: np.ndarray
-    #: Standard deviations between the sums and their floors, and where a knot scatters unlike the others, there.
-    critical: float
-    critical_unlike: float | None
-    #: One for each grid point.
+    criticals: Criticals
+    #: One for each state of the valve and each direction of the class that the data allow.
     proofs: tuple[Proof, ...]
 
 
@@ -100,55 +110,35 @@ def certify(
     NoCurveAgreesError
         If no threshold of the class agrees with the data.
     """
-    data, critical, critical_unlike = data_sets(scatter, curves.grid_MPa, 1 - confidence, unknown_drift)
-    bound = np.full(curves.grid_MPa.size, np.inf)
-    proofs: list[Proof | None] = [None] * bound.size
+    criticals = find_criticals(scatter, 1 - confidence)
+    data = data_sets(scatter, curves.grid_MPa, criticals, unknown_drift)
+    bound, proofs = np.full(curves.grid_MPa.size, np.inf), list[Proof]()
     refused: NoCurveAgreesError | None = None
     for each in one_way(curves):
         for known in data:
             try:
-                offsets, multipliers = largest_offsets(each, known)
+                proof = largest_offsets(each, known)
             except NoCurveAgreesError as error:  # of a direction that is not known, the data may contradict one
                 refused = error
                 continue
-            lower = each.under_chords(offsets)
-            for at in map(int, np.flatnonzero(lower < bound)):
-                bound[at] = lower[at]
-                # Of a direction alone the chord's lower end is what counts, with its proof.
-                source = at if np.isfinite(each.density).all() else _lowest_end(each, offsets, at)
-                rows = np.flatnonzero(multipliers[source])
-                proofs[at] = Proof(state=known.state, direction=each.direction, rows=rows,
-                                   multipliers=multipliers[source][rows])  # fmt: skip
-    if not np.isfinite(bound).all() and refused is not None:
+            bound = np.minimum(bound, each.under_chords(proof.offsets))
+            proofs.append(proof)
+    if refused is not None and not proofs:
         raise refused
-    return Certificate(
-        curves=curves,
-        data=data,
-        bound=bound,
-        critical=critical,
-        critical_unlike=critical_unlike,
-        proofs=tuple(proof for proof in proofs if proof is not None),
-    )
+    return Certificate(curves=curves, data=data, bound=bound, criticals=criticals, proofs=tuple(proofs))
 
 
-def largest_offsets(curves: CurveClass, data: DataSet) -> tuple[np.ndarray, np.ndarray]:
-    """Return the largest safe offset at every grid point, V (N,), and the multipliers (N, R) that prove it.
-
-    Their rows are those of `known_rows`. A multiplier's error is made good: what A'l lacks of e(p) counts with the
-    largest threshold that there may be.
-    """
+def largest_offsets(curves: CurveClass, data: DataSet) -> Proof:
+    """Return the largest safe offset at every grid point and the multipliers that prove it."""
     from scipy.optimize import linprog
     from scipy.sparse import csr_array, eye_array, kron
 
-    left, right = known_rows(curves, data)
-    count, base = curves.grid_MPa.size, float(data.floor.max())
-    # mV from a common zero, so that all numbers of the programme are of one size. Rows that sum to nothing keep theirs.
-    right = 1e3 * (right - base * left.sum(axis=1))
+    left, right, _ = _from_common_zero(curves, data)
+    count = curves.grid_MPa.size
     # The programmes of all points at once: the solver is called once in place of thirty times.
-    every = kron(eye_array(count), csr_array(left.T), format="csr")
-    points = np.eye(count)
+    every, points = kron(eye_array(count), csr_array(left.T), format="csr"), np.eye(count).ravel()
     for method, options in SOLVERS:
-        solved = linprog(-np.tile(right, count), A_eq=every, b_eq=points.ravel(), method=method, options=options)
+        solved = linprog(-np.tile(right, count), A_eq=every, b_eq=points, method=method, options=options)
         if solved.status == 0:
             break
     else:
@@ -156,26 +146,51 @@ def largest_offsets(curves: CurveClass, data: DataSet) -> tuple[np.ndarray, np.n
             "the thresholds of the ramps agree with no curve of the premise; declare another --curve, or record more "
             "ramps"
         )
-    # No threshold of the class lies further from the common zero than this.
-    largest = 2 * float(data.roof.max() - data.floor.min())
-    offsets, multipliers = np.empty(count), np.maximum(solved.x, 0.0).reshape(count, -1)
-    slack = np.abs(solved.lower.marginals).reshape(count, -1)
-    for at, point in enumerate(points):
-        multipliers[at] = _exact(left, point, (multipliers[at] > SMALLEST) | (slack[at] < SLACK))
-        left_over = float(np.sum(np.abs(left.T @ multipliers[at] - point)))
-        if left_over > PROOF:
-            raise InputError(f"the certificate's multipliers miss their proof by {left_over:.1g}; record more ramps")
-        offsets[at] = base + float(right @ multipliers[at]) / 1e3 - left_over * largest
-    return offsets, multipliers
+    # Rows that hold with equality, or that the solver used.
+    slack, used = (each.reshape(count, -1) for each in (np.abs(solved.lower.marginals), solved.x))
+    return prove(curves, data, [np.flatnonzero(row) for row in (used > SMALLEST) | (slack < SLACK)])
 
 
-def _exact(left: np.ndarray, point: np.ndarray, used: np.ndarray) -> np.ndarray:
-    """Return multipliers whose proof is exact to double precision, of the rows that hold with equality alone."""
+def prove(curves: CurveClass, data: DataSet, rows: Sequence[np.ndarray]) -> Proof:
+    """Return the offset that some rows of what is known prove at each grid point, with exact multipliers.
+
+    They are those of `known_rows`. What A'l lacks of e(p), of rounding, counts with what thresholds differ by.
+
+    Raises
+    ------
+    InputError
+        If the rows prove nothing.
+    """
     from scipy.optimize import nnls
 
-    found = np.zeros(used.size)
-    found[used] = nnls(left[used].T, point)[0]
-    return found
+    left, right, base = _from_common_zero(curves, data)
+    # No threshold of the class lies further from the common zero than this.
+    largest = 2 * float(data.roof.max() - data.floor.min())
+    offsets, kept, multipliers = np.empty(len(rows)), [], []
+    for at, of_point in enumerate(rows):
+        point = np.zeros(left.shape[1])
+        point[at] = 1.0
+        found = nnls(left[of_point].T, point)[0] if of_point.size else np.zeros(0)
+        left_over = float(np.sum(np.abs(found @ left[of_point] - point)))
+        if left_over > PROOF:
+            raise InputError(f"the multipliers of a certified bound miss their proof by {left_over:.1g}")
+        offsets[at] = base + float(right[of_point] @ found) / 1e3 - left_over * largest
+        kept.append(of_point[found > 0])
+        multipliers.append(found[found > 0])
+    return Proof(
+        state=data.state, direction=curves.direction, offsets=offsets, rows=tuple(kept),
+        multipliers=tuple(multipliers),
+    )  # fmt: skip
+
+
+def _from_common_zero(curves: CurveClass, data: DataSet) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return `known_rows` with the right sides in mV from a common zero, and that, V.
+
+    So all numbers of the programme are of one size. Rows that sum to nothing keep theirs.
+    """
+    left, right = known_rows(curves, data)
+    base = float(data.floor.max())
+    return left, 1e3 * (right - base * left.sum(axis=1)), base
 
 
 def known_rows(curves: CurveClass, data: DataSet) -> tuple[np.ndarray, np.ndarray]:
@@ -196,11 +211,6 @@ def running_minimum(bound: np.ndarray, direction: int) -> np.ndarray:
         return np.full_like(bound, bound.min())
     found = np.minimum.accumulate(bound if direction < 0 else bound[::-1])
     return found if direction < 0 else found[::-1]
-
-
-def _lowest_end(curves: CurveClass, offsets: np.ndarray, at: int) -> int:
-    other = min(at + 1, offsets.size - 1) if curves.direction < 0 else max(at - 1, 0)
-    return at if offsets[at] <= offsets[other] else other
 
 
 # ------------------------------------------------------------------------------------------------------- the data set
@@ -227,39 +237,44 @@ def states_of(scatter: Scatter) -> tuple[float, ...]:
     return (-0.5, 0.5) if scatter.model.drift else (0.0,)
 
 
+def find_criticals(scatter: Scatter, error: float) -> Criticals:
+    """Return the critical values of all sums in all states; of two scatters each has half of the error probability."""
+    weights = [contrasts(scatter, state) for state in states_of(scatter)]
+    unlike, parts = scatter.unlike, 1 if scatter.unlike is None else 2
+    floor, roof = (
+        critical(np.vstack(weights), scatter.degrees, scatter.share, share * error / parts) for share in (FLOORS, ROOFS)
+    )
+    if unlike is None:
+        return Criticals(floor=floor, roof=roof)
+    rows = np.vstack([each[unlike.knot] for each in weights])
+    own = [critical(rows, unlike.degrees, 1.0, share * error / parts) for share in (FLOORS, ROOFS)]
+    return Criticals(floor=floor, roof=roof, floor_unlike=own[0], roof_unlike=own[1])
+
+
 def data_sets(
-    scatter: Scatter, grid_MPa: np.ndarray, error: float, unknown_drift: float
-) -> tuple[tuple[DataSet, ...], float, float | None]:
-    """Return what is known in each state, the critical value, and that of a knot that scatters unlike the others."""
-    states = states_of(scatter)
-    weights = [contrasts(scatter, state) for state in states]
-    every, unlike = np.vstack(weights), scatter.unlike
-    tails = {"low": FLOORS * error, "high": ROOFS * error}
-    own: dict[str, float] = {}
-    if unlike is not None:  # two scatters, each with half of the tail
-        tails = {name: tail / 2 for name, tail in tails.items()}
-        rows = np.vstack([each[unlike.knot] for each in weights])
-        own = {name: critical(rows, unlike.degrees, 1.0, tail) for name, tail in tails.items()}
-    common = {name: critical(every, scatter.degrees, scatter.share, tail) for name, tail in tails.items()}
-    ramps = scatter.model.ramps
+    scatter: Scatter, grid_MPa: np.ndarray, criticals: Criticals, unknown_drift: float = 0.0
+) -> tuple[DataSet, ...]:
+    """Return what is known of the next closing in each state of the valve."""
+    unlike, ramps = scatter.unlike, scatter.model.ramps
     at = broken_line(ramps.dp_MPa, grid_MPa)
     clock = np.zeros(ramps.y.size) if ramps.clock is None else ramps.clock
     budget = np.zeros(ramps.y.size) if ramps.budget is None else ramps.budget
     unknown = 0.0 if scatter.model.drift else unknown_drift
     found = []
-    for state, each in zip(states, weights, strict=True):
+    for state in states_of(scatter):
+        each = contrasts(scatter, state)
         next_one = np.full(len(each), scatter.share * scatter.variance)
-        low, high = np.full(len(each), common["low"]), np.full(len(each), common["high"])
+        low, high = np.full(len(each), criticals.floor), np.full(len(each), criticals.roof)
         if unlike is not None:
             next_one[unlike.knot] = max(unlike.variance, scatter.variance)
-            low[unlike.knot], high[unlike.knot] = own["low"], own["high"]
+            low[unlike.knot], high[unlike.knot] = criticals.floor_unlike, criticals.roof_unlike
         sd = np.sqrt(next_one + each**2 @ scatter_of_ramps(scatter))
         middle = each @ ramps.y
-        wide = unknown * (0.5 + np.abs(each @ clock)) + np.abs(each) @ budget
+        wide = unknown * (0.5 + np.abs(each @ clock)) + np.abs(each) @ budget + ramps.shared
         found.append(
             DataSet(state=state, rows=each @ at, floor=middle - low * sd - wide, roof=middle + high * sd + wide)
         )
-    return tuple(found), common["low"], own.get("low")
+    return tuple(found)
 
 
 def critical(weights: np.ndarray, degrees: float, share: float, tail: float) -> float:
@@ -301,6 +316,8 @@ class AboveBound:
 
     dp_MPa: np.ndarray
     bound: np.ndarray
+    #: False of a threshold that is only known to run one way, and may fall: then it is a guess.
+    certified: bool = True
 
 
 def continue_above(
@@ -310,22 +327,28 @@ def continue_above(
     confidence: float = 0.99,
     unknown_drift: float = 0.0,
 ) -> AboveBound | None:
-    """Continue the bound above the last test; None where the class says nothing there: a direction that may fall.
+    """Continue the bound above the last test; None where nothing is known between the tests either.
 
-    A line goes on; a curve that bends by at most M lies at most M/2 (x - a)(x - b) below the chord of two tests a < b,
-    b the last. Of all tests that one gives the slope which leaves the largest bound, by their errors and M alone.
+    A threshold that rises, as far as is known, stays; one that may fall goes on with the steepest slope between two
+    tests, and nothing is certified. A line goes on; a curve that bends by at most M lies at most M/2 (x - a)(x - b)
+    below the chord of two tests a < b, b the last. Of all tests that one gives the slope which leaves the largest
+    bound, by their errors and M alone.
     """
     curves, model = certificate.curves, scatter.model
-    knots = np.round(model.knots_MPa, 6)
+    knots = model.knots_MPa
     last = float(curves.grid_MPa[-1])
-    if curves.kind == "points" or (curves.kind == "monotone" and curves.direction <= 0):
+    if curves.kind == "points":
         return None
     steps = [1.0, FIRST_STEP]
     while steps[-1] * STEP < FURTHEST:
         steps.append(steps[-1] * STEP)
-    nodes = np.round(last * np.array(steps), 6)
+    nodes = np.round(last * np.array(steps), 7)
     if curves.kind == "monotone":
-        return AboveBound(dp_MPa=nodes, bound=np.full(nodes.size, certificate.bound[-1]))
+        rises = curves.direction > 0
+        slope = 0.0 if rises else min(float(np.min(np.diff(model.at_knots) / np.diff(knots))), 0.0)
+        return AboveBound(
+            dp_MPa=nodes, bound=certificate.bound[-1] + slope * (nodes - last), certified=rises
+        )
     bend = 2.0 * float(curves.density.max()) if curves.kind == "bends" else float(curves.density.max())
     found = []
     for start in range(knots.size - 1):
@@ -371,7 +394,7 @@ def _band_above(
     lows = [
         (
             factor * np.sqrt(scatter.share * variances.max() + each**2 @ variances)
-            + unknown * (0.5 + np.abs(each @ clock)) + np.abs(each) @ budget,
+            + unknown * (0.5 + np.abs(each @ clock)) + np.abs(each) @ budget + ramps.shared,
             each @ ramps.y,
         )
         for each in by_state

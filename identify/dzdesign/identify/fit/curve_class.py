@@ -23,9 +23,11 @@ GRID = 25
 #: Grid points nearer than this share of the range are one.
 NEAREST = 0.003
 #: Pressures of the grid are rounded to so many decimals, MPa: valve.json's.
-DECIMALS = 6
+DECIMALS = 7
 #: Fewest knots that show a bend.
 FEWEST_FOR_BENDS = 3
+#: From so many degrees of freedom on, Student's law is the normal one.
+LARGEST_DEGREES = 1e6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,6 +65,7 @@ class CurveClass:
         found: np.ndarray = least - np.maximum(np.append(sag, 0.0), np.append(0.0, sag)) - self.at_ends
         if known.all():
             return found
+        # Of a direction alone all between two points lies above the lower end.
         next_one = np.append(found[1:], np.inf) if self.direction < 0 else np.append(np.inf, found[:-1])
         lowest: np.ndarray = np.minimum(found, next_one)
         return lowest
@@ -179,3 +182,38 @@ def class_of_bends(knots_MPa: np.ndarray, grid_MPa: np.ndarray, change: np.ndarr
         at_ends=np.where(ends, below, 0.0),
         change=change,
     )
+
+
+def lack_of_fit(scatter: Scatter, *, curve: Kind, curvature: float | None, direction: int = 0) -> float | None:
+    """Return the probability of tests as unlike a declared premise as these if it were true; None: they can't tell.
+
+    `line`: an F test of the knots about the line. `smooth`: the largest change of slope beyond M. `monotone`: the
+    largest step against the direction, of one that is not known the likelier. The latter two with Bonferroni.
+    """
+    from scipy.special import fdtrc, stdtr
+
+    model = scatter.model
+    knots, weights = model.knots_MPa, model.weights[: model.knots_MPa.size]
+    if knots.size < FEWEST_FOR_BENDS:
+        return None
+    values, degrees = weights @ model.ramps.y, min(scatter.degrees, LARGEST_DEGREES)
+    covariance = (weights * scatter_of_ramps(scatter)) @ weights.T
+    if curve == "line":
+        line = np.column_stack([np.ones(knots.size), knots])
+        inverse = np.linalg.inv(covariance)
+        left = values - line @ np.linalg.solve(line.T @ inverse @ line, line.T @ inverse @ values)
+        return float(fdtrc(knots.size - 2, degrees, float(left @ inverse @ left) / (knots.size - 2)))
+    if curve == "smooth":
+        rows = 2 * np.diff(np.diff(np.eye(knots.size), axis=0) / np.diff(knots)[:, None], axis=0)
+        rows /= (knots[2:] - knots[:-2])[:, None]
+        beyond = rows @ values - (curvature or 0.0)
+    else:
+        pairs = np.triu_indices(knots.size, 1)
+        rows = np.eye(knots.size)[pairs[1]] - np.eye(knots.size)[pairs[0]]
+        if not direction:
+            each = [lack_of_fit(scatter, curve=curve, curvature=None, direction=way) for way in (-1, 1)]
+            return max(p_value for p_value in each if p_value is not None)
+        beyond = -direction * (rows @ values)
+    error = np.sqrt(np.einsum("ni,ij,nj->n", rows, covariance, rows))
+    largest = float(np.max(beyond / np.maximum(error, np.finfo(float).tiny)))
+    return float(min(1.0, len(rows) * stdtr(degrees, -largest)))

@@ -33,6 +33,8 @@ class Ramps:
     clock: np.ndarray | None = None
     #: What systematic errors may move each threshold by, either way, V; None: by nothing.
     budget: np.ndarray | None = None
+    #: What they may move all thresholds by together, V: the meter's lag does.
+    shared: float = 0.0
 
     def only(self, kept: np.ndarray) -> "Ramps":
         """Return those ramps alone, of a mask (n,)."""

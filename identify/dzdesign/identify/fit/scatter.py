@@ -8,11 +8,13 @@ three ramps no test tells one that lies off from a wide scatter in which two hap
 """
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from dzdesign.identify.fit.ramp_model import RampModel, Ramps, fit_ramp_model
 
+Origin = Literal["repeats", "declared", "assumed"]
 #: Probability, all ramps counted, of a residual for which a ramp is set aside.
 OUTLYING = 0.01
 #: Probability of one knot's share in the scatter below which it has a variance of its own.
@@ -62,7 +64,7 @@ class Scatter:
     degrees: float
     #: Share of it that the next closing has.
     share: float
-    origin: str
+    origin: Origin
     unlike: Unlike | None
     set_aside: tuple[SetAside, ...]
 
@@ -79,7 +81,7 @@ class Scatter:
         return kept
 
 
-def measure_scatter(ramps: Ramps, *, declared: float | None, assumed: float) -> Scatter:
+def measure_scatter(ramps: Ramps, *, declared: float | None, assumed: float, least: float = 0.0) -> Scatter:
     """Fit the ramps of a branch, set aside those that lie off, and measure the scatter of the others.
 
     Parameters
@@ -90,17 +92,35 @@ def measure_scatter(ramps: Ramps, *, declared: float | None, assumed: float) -> 
         Standard deviation from ramp to ramp, V; None measures it.
     assumed : float
         Taken where nothing tells it, V.
+    least : float
+        Standard deviation at least, V: half the distance of two groups in which the ramps lie. Then every ramp counts,
+        for those of the smaller group lie off as the others do.
     """
     kept, found = np.ones(ramps.y.size, dtype=bool), list[SetAside]()
     while True:
         model = fit_ramp_model(ramps.only(kept), share_knots=declared is None)
         unlike = find_unlike_knot(model)
-        outlying = _find_outlying(model, unlike, declared, assumed) if len(found) < ramps.y.size // ONE_IN else None
+        outlying = None
+        if not least and len(found) < ramps.y.size // ONE_IN:
+            outlying = _find_outlying(model, unlike, declared, assumed)
         if outlying is None:
             break
         at = int(np.flatnonzero(kept)[outlying.ramp])
         kept[at] = False
         found.append(SetAside(ramp=at, distance=outlying.distance, ratio=outlying.ratio))
+    return describe_scatter(model, unlike, declared=declared, assumed=assumed, least=least, set_aside=tuple(found))
+
+
+def describe_scatter(
+    model: RampModel,
+    unlike: Unlike | None,
+    *,
+    declared: float | None,
+    assumed: float,
+    least: float = 0.0,
+    set_aside: tuple[SetAside, ...] = (),
+) -> Scatter:
+    """Return the scatter of ramps that are kept, of which those at a knot may be unlike the others."""
     squares, degrees = _squares(model, unlike)
     noise = float(np.mean(model.ramps.se**2))
     origin = _origin(squares, degrees, noise, declared, assumed)
@@ -108,13 +128,13 @@ def measure_scatter(ramps: Ramps, *, declared: float | None, assumed: float) -> 
     measured = origin == "repeats"
     return Scatter(
         model=model,
-        variance=max(squares / degrees, noise) if measured else known,
+        variance=max(squares / degrees if measured else known, noise, least**2),
         degrees=degrees if measured else np.inf,
         # A measured variance has the noise in it, and counts whole: what the repeats tell of the valve alone errs more.
-        share=1.0 if measured else 1 - noise / known,
+        share=1.0 if measured or not known > 0 else 1 - noise / known,
         origin=origin,
         unlike=unlike if measured else None,
-        set_aside=tuple(found),
+        set_aside=set_aside,
     )
 
 
@@ -145,8 +165,15 @@ def find_unlike_knot(model: RampModel) -> Unlike | None:
     p_value, knot = float(np.max(chances, axis=0)[worst]), int(told[worst])
     if p_value > UNEQUAL or _one_explains(model, residual, knot):
         return None
-    squares = float(np.sum(residual[model.knot == knot] ** 2))
-    return Unlike(knot=knot, variance=squares / degrees[knot], degrees=float(degrees[knot]), p_value=p_value)
+    return unlike_at(model, knot, p_value)
+
+
+def unlike_at(model: RampModel, knot: int, p_value: float) -> Unlike:
+    """Return the scatter at a knot whose ramps are unlike the others."""
+    there = model.knot == knot
+    degrees = float(np.diag(model.projector)[there].sum())
+    squares = float(np.sum((model.projector @ model.ramps.y)[there] ** 2))
+    return Unlike(knot=knot, variance=squares / degrees, degrees=degrees, p_value=p_value)
 
 
 def _one_explains(model: RampModel, residual: np.ndarray, knot: int) -> bool:
@@ -205,7 +232,7 @@ def _find_outlying(model: RampModel, unlike: Unlike | None, declared: float | No
     return SetAside(ramp=row, distance=float(residual[row] / own[row]), ratio=float(ratio[row]))
 
 
-def _origin(squares: float, degrees: float, noise: float, declared: float | None, assumed: float) -> str:
+def _origin(squares: float, degrees: float, noise: float, declared: float | None, assumed: float) -> Origin:
     """Return where the scatter is from: a declared or assumed one counts unless the repeats contradict it."""
     from scipy.special import chdtrc
 
