@@ -19,13 +19,13 @@ from functools import lru_cache
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.fit.curve_class import CurveClass, one_way, scatter_of_ramps
+from dzdesign.identify.fit.curve_class import CurveClass, Kind, one_way, scatter_of_ramps
 from dzdesign.identify.fit.ramp_model import broken_line
 from dzdesign.identify.fit.scatter import Scatter
 
-#: Shares of the error probability, 1 % by default: of the floors, the roofs and the bound above the tests. The rest,
-#: 20 %, is kept for the rule of the bends.
-FLOORS, ROOFS, ABOVE = 0.70, 0.05, 0.05
+#: Shares of the error probability, 1 % by default, of the roofs and of the bound above the tests; and what is kept for
+#: the rule of the bends. The floors have the rest: all of it where only the tests themselves are certified.
+ROOFS, ABOVE, OF_BENDS = 0.05, 0.05, 0.2
 DRAWS, SEED = 40_000, 20240
 #: Neighbouring draws that count as one where the scatter's error is integrated.
 TOGETHER = 8
@@ -80,7 +80,8 @@ class Criticals:
     """Standard deviations between the sums and their floors and roofs; those of a knot that scatters unlike apart."""
 
     floor: float
-    roof: float
+    #: None where nothing between the tests is certified.
+    roof: float | None
     floor_unlike: float | None = None
     roof_unlike: float | None = None
 
@@ -110,7 +111,7 @@ def certify(
     NoCurveAgreesError
         If no threshold of the class agrees with the data.
     """
-    criticals = find_criticals(scatter, 1 - confidence)
+    criticals = find_criticals(scatter, curves.kind, 1 - confidence)
     data = data_sets(scatter, curves.grid_MPa, criticals, unknown_drift)
     bound, proofs = np.full(curves.grid_MPa.size, np.inf), list[Proof]()
     refused: NoCurveAgreesError | None = None
@@ -165,7 +166,8 @@ def prove(curves: CurveClass, data: DataSet, rows: Sequence[np.ndarray]) -> Proo
 
     left, right, base = _from_common_zero(curves, data)
     # No threshold of the class lies further from the common zero than this.
-    largest = 2 * float(data.roof.max() - data.floor.min())
+    highest = data.roof if np.isfinite(data.roof).all() else data.floor
+    largest = 2 * float(highest.max() - data.floor.min())
     offsets, kept, multipliers = np.empty(len(rows)), [], []
     for at, of_point in enumerate(rows):
         point = np.zeros(left.shape[1])
@@ -237,18 +239,30 @@ def states_of(scatter: Scatter) -> tuple[float, ...]:
     return (-0.5, 0.5) if scatter.model.drift else (0.0,)
 
 
-def find_criticals(scatter: Scatter, error: float) -> Criticals:
+def find_criticals(scatter: Scatter, kind: Kind, error: float) -> Criticals:
     """Return the critical values of all sums in all states; of two scatters each has half of the error probability."""
-    weights = [contrasts(scatter, state) for state in states_of(scatter)]
-    unlike, parts = scatter.unlike, 1 if scatter.unlike is None else 2
-    floor, roof = (
-        critical(np.vstack(weights), scatter.degrees, scatter.share, share * error / parts) for share in (FLOORS, ROOFS)
-    )
+    alone, unlike = kind == "points", scatter.unlike
+    # Of tests alone the sums that mix them would only cost.
+    weights = [contrasts(scatter, state)[: scatter.model.knots_MPa.size if alone else None]
+               for state in states_of(scatter)]  # fmt: skip
+    floors = 1.0 if alone else 1 - ROOFS - ABOVE - (OF_BENDS if kind == "bends" else 0.0)
+    parts = 1 if unlike is None else 2
+
+    def value(rows: np.ndarray, degrees: float, share: float, of_error: float) -> float:
+        return critical(rows, degrees, share, of_error * error / parts)
+
+    every = np.vstack(weights)
+    floor = value(every, scatter.degrees, scatter.share, floors)
+    roof = None if alone else value(every, scatter.degrees, scatter.share, ROOFS)
     if unlike is None:
         return Criticals(floor=floor, roof=roof)
     rows = np.vstack([each[unlike.knot] for each in weights])
-    own = [critical(rows, unlike.degrees, 1.0, share * error / parts) for share in (FLOORS, ROOFS)]
-    return Criticals(floor=floor, roof=roof, floor_unlike=own[0], roof_unlike=own[1])
+    return Criticals(
+        floor=floor,
+        roof=roof,
+        floor_unlike=value(rows, unlike.degrees, 1.0, floors),
+        roof_unlike=None if alone else value(rows, unlike.degrees, 1.0, ROOFS),
+    )
 
 
 def data_sets(
@@ -263,17 +277,18 @@ def data_sets(
     found = []
     for state in states_of(scatter):
         each = contrasts(scatter, state)
+        if criticals.roof is None:  # tests alone
+            each = each[: scatter.model.knots_MPa.size]
         next_one = np.full(len(each), scatter.share * scatter.variance)
-        low, high = np.full(len(each), criticals.floor), np.full(len(each), criticals.roof)
+        low, high = np.full(len(each), criticals.floor), np.full(len(each), criticals.roof or 0.0)
         if unlike is not None:
             next_one[unlike.knot] = max(unlike.variance, scatter.variance)
-            low[unlike.knot], high[unlike.knot] = criticals.floor_unlike, criticals.roof_unlike
+            low[unlike.knot], high[unlike.knot] = criticals.floor_unlike or 0.0, criticals.roof_unlike or 0.0
         sd = np.sqrt(next_one + each**2 @ scatter_of_ramps(scatter))
         middle = each @ ramps.y
         wide = unknown * (0.5 + np.abs(each @ clock)) + np.abs(each) @ budget + ramps.shared
-        found.append(
-            DataSet(state=state, rows=each @ at, floor=middle - low * sd - wide, roof=middle + high * sd + wide)
-        )
+        roof = np.full(len(each), np.inf) if criticals.roof is None else middle + high * sd + wide
+        found.append(DataSet(state=state, rows=each @ at, floor=middle - low * sd - wide, roof=roof))
     return tuple(found)
 
 
