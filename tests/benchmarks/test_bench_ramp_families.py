@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 from ramp_families import SCATTER, SHAPES, TARGETED, Design, simulate
+from ramp_series import FALLING, FLAT
+from ramp_series import _family as family_through_recordings
 
-from dzdesign.identify.fit import certificate, ramp_model, scatter
+from dzdesign.identify.fit import certificate, ramp_model
 
 COUNT = 12
 
@@ -33,6 +35,21 @@ def test_a_critical_value_that_is_left_out_is_seen(monkeypatch):
 
 def test_a_drift_that_is_left_out_is_seen(monkeypatch):
     monkeypatch.setattr(ramp_model, "TELLS_DRIFT", 1e9)
-    monkeypatch.setattr(scatter, "CONTRADICTED", 0.0)  # else the repeat at the end contradicts the declared scatter
     _, design, _ = TARGETED["line, drift of 2 %, single ramps and a closing repeat"]
     assert below("line", design) > 0.3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("how", "scatter_mV", "drift"),
+    [("one ramp", 12.5, 0.0), ("three repeats", 25.0, 0.0), ("three repeats in random order", 12.5, -0.02)],
+)
+def test_ten_families_through_raw_recordings(how, scatter_mV, drift):
+    """Read from the samples of every ramp; two of ten is once in two hundred benchmarks."""
+    rng = np.random.default_rng([20261122, round(scatter_mV), len(how)])
+    falling, flat = (
+        [family_through_recordings(truth, how, 1e-3 * scatter_mV, drift, rng) for _ in range(10)]
+        for truth in (FALLING, FLAT)
+    )
+    assert sum(opened for opened, _ in falling) <= 1
+    assert sum(opened for opened, _ in flat) <= 1 and sum(trend for _, trend in flat) <= 1

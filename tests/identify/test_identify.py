@@ -10,7 +10,7 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, find_trend, lower_bounds
-from dzdesign.identify.knees.between_ramps import BetweenRamps, RampKnees, compare_ramps
+from dzdesign.identify.knees.between_ramps import BetweenRamps, RampKnees, pool_scatter
 from dzdesign.identify.knees.meter_floor import find_meter_floor
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.branches import bin_branch
@@ -42,7 +42,7 @@ def without_scatter(count: int) -> BetweenRamps:
     """What tests of one ramp each have between them if the valve is declared to repeat exactly."""
     known = RampKnees(*np.array([(test, 0, 5.0, 0.0, math.nan) for test in range(count)]).T)
     known = dataclasses.replace(known, test=known.test.astype(int), number=known.number.astype(int))
-    return compare_ramps(known, [1] * count, declared=0.0, u_max=10.0)
+    return pool_scatter(known, [1] * count, declared=0.0, u_max=10.0)
 
 
 def falling_threshold(dp: float) -> float:
@@ -131,7 +131,7 @@ class TestLaw:
         side = valve_of(falling_threshold, options=IdentifyOptions(curve=curve)).positive
         assert side.curve.premise == curve
         fine = np.linspace(*side.valid_dp_MPa, 997)
-        bound = side.curve.bound(side.trend).in_doubles(fine)
+        bound = side.curve.bound().in_doubles(fine)
         assert np.all(np.interp(fine, side.curve.offset_dp_MPa, side.curve.offset_V) <= bound + 1e-6)
         assert np.all(bound < falling_threshold(fine) - 0.1)
 

@@ -122,7 +122,7 @@ def excess_of(tests, options=None):
     """Return by how much the bounds of a valve of `by_hand` lie above its thresholds at most, V."""
     side, excess = identify(tests, options).positive, [-np.inf]
     for guard, curve in side.certified.items():
-        ceilings = [curve.bound(side.trend or "flat")]
+        ceilings = [curve.bound()]
         if curve.above is not None and curve.above.certified:
             ceilings.append(curve.above.bound())
         below = {"closing": 0.1, "mean": 0.05, "opening": 0.0}[guard]

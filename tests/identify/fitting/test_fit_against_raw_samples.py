@@ -1,75 +1,34 @@
 """Referees for the fits: the same problems, written from their statements for other solvers, on other data.
 
-Nothing of `identify.fit` stands on the referees' side: cvxpy's CLARABEL at tight tolerances, NumPy's lines through raw
-samples, pool-adjacent-violators on the profile likelihood, and a Tobit likelihood of single samples in SciPy. Each
-referee is itself tried: a fault seeded in the fit must show as a disagreement.
+Nothing of `identify.fitting` stands on the referees' side: cvxpy's CLARABEL at tight tolerances, NumPy's lines through
+raw samples, and a Tobit likelihood of single samples in SciPy. Each referee is itself tried: a fault seeded in the fit
+must show as a disagreement.
 """
 
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
-import casadi as ca
 import cvxpy as cp
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from scipy.optimize import brentq, minimize
+from scipy.optimize import minimize
 from scipy.special import log_ndtr
 
-from dzdesign.core.errors import InputError
 from dzdesign.identify.fitting import casadi_problems as fit_problems
 from dzdesign.identify.fitting import constrained_fits as fit
 from dzdesign.identify.knees import characteristic
 from dzdesign.identify.knees.prepared_tests import describe_tests
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.branches import Bins, bin_branch
-from dzdesign.identify.valve.staircase import staircase
 from tests.support.synthetic import L_MIN, Truth, synthetic_ramp
 
 U_MAX = 10.0
 SEED = 20261121
-TRENDS = ("decreasing", "increasing", "flat")
 #: V; what two solvers of one convex problem may differ by.
 SAME = 1e-8
 #: V; what bins of 10 mV may cost against single samples, where readings are censored.
 BINNED = 50e-6
 #: V; no offset may exceed its ceiling, nor a knee run the wrong way, by more.
 FEASIBLE = 1e-9
-
-
-def nearest_that_runs_one_way(wanted, weight, trend, ceiling=None):
-    """Minimise ``sum(weight (x - wanted)^2)`` over x that run one way, not above a ceiling, by cvxpy.
-
-    Scaled so that CLARABEL converges: lengths by the largest in the problem, and each unknown by its weight. What is
-    flat is one unknown.
-    """
-    centre = wanted.mean() if ceiling is None else ceiling.mean()
-    known = [wanted - centre, np.zeros(1) if ceiling is None else ceiling - centre]
-    unit = max(float(np.abs(np.concatenate(known)).max()), 1e-12)
-    root = np.sqrt(weight / weight.min())
-    x = cp.Variable() * np.ones(wanted.size) if trend == "flat" else cp.multiply(1 / root, cp.Variable(wanted.size))
-    constraints = [] if trend == "flat" else [cp.diff(x) <= 0 if trend == "decreasing" else cp.diff(x) >= 0]
-    if ceiling is not None:
-        constraints.append(x <= (ceiling - centre) / unit)
-    miss = cp.multiply(root, x) - root * (wanted - centre) / unit
-    solve(cp.Problem(cp.Minimize(cp.sum_squares(miss / np.linalg.norm(root))), constraints))
-    return x.value * unit + centre
-
-
-def pooled(best_of, size, trend):
-    """Return what runs one way and costs least, by pooling adjacent violators: exact for convex costs of single items.
-
-    ``best_of(members)`` is the value that costs a block of them least.
-    """
-    sign = 1 if trend == "increasing" else -1
-    blocks = []
-    for index in range(size):
-        blocks.append(([index], best_of([index])))
-        while len(blocks) > 1 and sign * (blocks[-1][1] - blocks[-2][1]) < 0:
-            members = blocks[-2][0] + blocks[-1][0]
-            blocks[-2:] = [(members, best_of(members))]
-    return np.concatenate([np.full(len(members), value) for members, value in blocks])
 
 
 #: As tight as double precision bears; without the refinement one problem in 300 stalls.
@@ -80,97 +39,6 @@ REFINED = {"iterative_refinement_reltol": 1e-15, "iterative_refinement_abstol": 
 def solve(problem):
     problem.solve(solver=cp.CLARABEL, **TIGHT, **REFINED)
     assert problem.status == cp.OPTIMAL
-
-
-class TestOffset:
-    """`fit_offset`: the offset nearest to the guarded thresholds, monotone, under its ceiling."""
-
-    @staticmethod
-    def problem(seed, size, trend):
-        """Thresholds that need not run as the trend says, errors over three decades, ceilings below or above them."""
-        rng = np.random.default_rng([SEED, seed])
-        se = 10 ** rng.uniform(-4, -1, size)
-        drift = {"decreasing": -0.5, "increasing": 0.5, "flat": 0.0}[trend] * np.sort(rng.random(size))
-        guard = rng.uniform(1, 6) + drift + se * rng.standard_normal(size)
-        ceiling = guard - (4 * se if rng.random() < 0.5 else rng.uniform(-1, 4, size) * se)
-        return guard, se, np.maximum(ceiling, 0.05)
-
-    @staticmethod
-    def fitted(guard, se, ceiling, trend, reference=0):
-        """Return the offset found, V, and the weights of the statement: none outweighs another by more than 1e4."""
-        found = fit.fit_offset(guard, se, ceiling, reference, u_max=U_MAX, trend=trend)
-        assert found.beta[reference] == 1
-        offset = found.u_min0 * found.beta
-        assert (offset - ceiling).max() < FEASIBLE
-        return offset, np.minimum((se.max() / se) ** 2, 1e4)
-
-    def disagreement(self, seed, size, trend):
-        guard, se, ceiling = self.problem(seed, size, trend)
-        offset, weight = self.fitted(guard, se, ceiling, trend, seed % size)
-        return np.abs(offset - nearest_that_runs_one_way(guard, weight, trend, ceiling)).max()
-
-    @pytest.mark.parametrize("trend", TRENDS)
-    @pytest.mark.parametrize("size", range(2, 13))
-    def test_clarabel_finds_the_same(self, size, trend):
-        assert max(self.disagreement(seed, size, trend) for seed in range(4)) < SAME
-
-    @pytest.mark.slow
-    @settings(max_examples=300, deadline=None, derandomize=True)
-    @given(
-        seed=st.integers(0, 10**6), size=st.integers(2, 12), trend=st.sampled_from(TRENDS), reference=st.floats(0, 0.99)
-    )
-    def test_pooling_finds_the_same(self, seed, size, trend, reference):
-        """Exact, so any problem will do: CLARABEL is 1e-7 V off where a threshold comes within a hair of its bound."""
-        guard, se, ceiling = self.problem(seed, size, trend)
-        if seed % 2 and trend != "flat":  # as in use: ceilings that run one way, many of them equal
-            ceiling = staircase(ceiling, trend)[1]
-        offset, weight = self.fitted(guard, se, ceiling, trend, int(reference * size))
-
-        def best_of(members):
-            return min(np.average(guard[members], weights=weight[members]), ceiling[members].min())
-
-        everything = list(range(size))
-        expected = best_of(everything) * np.ones(size) if trend == "flat" else pooled(best_of, size, trend)
-        assert np.abs(offset - expected).max() < SAME / 10
-
-    def test_one_test_takes_the_nearest_that_it_may(self):
-        one = np.array([5.0])
-        for ceiling, expected in ((4.9, 4.9), (5.2, 5.0)):
-            found = fit.fit_offset(one, 0.01 * one, np.array([ceiling]), 0, u_max=U_MAX, trend="flat")
-            assert found.u_min0 == pytest.approx(expected, abs=SAME)
-
-    def test_errors_of_zero_weigh_alike(self):
-        guard = np.array([5.0, 5.2, 5.1])
-        found = fit.fit_offset(guard, np.zeros(3), guard + 1, 0, u_max=U_MAX, trend="flat")
-        assert found.u_min0 == pytest.approx(5.1, abs=SAME)
-
-    @pytest.mark.parametrize("fault", ["direction reversed", "no ceiling", "no weights"])
-    def test_the_referee_sees_a_fault(self, fault, monkeypatch, fresh_solvers, wording):
-        original = ca.qpsol
-
-        def faulty(*problem):
-            solver = original(*problem)
-
-            def solved(**bounds):
-                if fault == "direction reversed":
-                    bounds["lbg"], bounds["ubg"] = -bounds["ubg"], -bounds["lbg"]
-                if fault == "no ceiling":
-                    bounds["lbx"] = -np.inf
-                return solver(**bounds)
-
-            solved.stats = solver.stats
-            return solved
-
-        monkeypatch.setattr(ca, "qpsol", faulty)
-        if fault == "no weights":
-            monkeypatch.setattr(fit, "LARGEST_WEIGHT", 1.0)
-        if fault != "no weights":  # seen by the fit itself
-            with wording.refusal(InputError):
-                for seed in range(10):
-                    self.disagreement(seed, 6, "decreasing")
-            return
-        seen = [self.disagreement(seed, 6, "decreasing") for seed in range(10)]
-        assert max(seen) > 1e4 * SAME
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -230,8 +98,8 @@ def valve(seed, spread=0.05):
     return samples, [tuple(branch.described(rng) for branch in pair) for pair in samples]
 
 
-def fitted(shapes, trend, floor=0.0, ordered=1):
-    return fit.fit_knees(shapes, floor=floor, u_max=U_MAX, trend=trend, ordered=ordered)
+def fitted(shapes, floor=0.0):
+    return fit.fit_knees(shapes, floor=floor, u_max=U_MAX)
 
 
 def over_pairs(function, pairs):
@@ -239,8 +107,7 @@ def over_pairs(function, pairs):
 
 
 def forget_solvers():
-    for build in (fit_problems.offset_solver, fit_problems._knee_solver):
-        build.cache_clear()
+    fit_problems._knee_solver.cache_clear()
 
 
 @pytest.fixture
@@ -266,17 +133,17 @@ def test_a_solver_that_was_used_before_gives_what_a_new_one_gives():
     """Solvers are kept, so nothing of one valve may be left in them for the next."""
     quiet, loud = valve(1)[1], valve(2)[1]
     forget_solvers()
-    for trend in ("flat", "decreasing", "increasing"):
-        first = fitted(quiet, trend)
-        fitted(loud, trend)
-        kept = fitted(quiet, trend)
+    for _ in range(2):
+        first = fitted(quiet)
+        fitted(loud)
+        kept = fitted(quiet)
         forget_solvers()
         assert np.array_equal(first.knee, kept.knee) and np.array_equal(first.knee_se, kept.knee_se)
-        assert np.array_equal(first.slope, kept.slope) and first.active == kept.active
+        assert np.array_equal(first.slope, kept.slope)
 
 
 class TestLines:
-    """`fit_knees` without an order and without censored samples: one least-squares line a branch."""
+    """`fit_knees` without censored samples: one least-squares line a branch."""
 
     @staticmethod
     def polyfit_knee(samples):
@@ -303,7 +170,7 @@ class TestLines:
 
     def disagreement(self, seed):
         samples, shapes = valve(seed)
-        knee = fitted(shapes, "flat").knee
+        knee = fitted(shapes).knee
         raw = np.abs(knee - over_pairs(self.polyfit_knee, samples)).max()
         return raw, np.abs(knee - self.clarabel_knees(shapes)).max()
 
@@ -315,113 +182,6 @@ class TestLines:
     def test_the_referees_see_a_fault(self, statistic, monkeypatch):
         monkeypatch.setattr(fit, "branch_numbers", without(statistic))
         assert min(self.disagreement(0)) > 100 * SAME
-
-
-class TestOrderedKnees:
-    """`fit_knees` with an order: nearest in likelihood among the knees that run one way."""
-
-    @staticmethod
-    def clarabel_knees(samples, shapes, slopes, trend):
-        """With the slopes known, the cost is a parabola about each line's zero: a quadratic programme."""
-        zero = np.array([raw.u.mean() - raw.y.mean() / slope for raw, slope in zip(samples, slopes, strict=True)])
-        stiffness = [
-            raw.u.size * (slope / shape.sigma) ** 2 for raw, shape, slope in zip(samples, shapes, slopes, strict=True)
-        ]
-        return nearest_that_runs_one_way(zero, np.array(stiffness), trend)
-
-    @staticmethod
-    def best_slope(samples, knee):
-        return np.dot(samples.y, samples.u - knee) / np.dot(samples.u - knee, samples.u - knee)
-
-    @classmethod
-    def pooling_knees(cls, samples, shapes, trend):
-        """Pool adjacent violators on the likelihood with each slope at its best: no slope is taken from the fit."""
-        zero = np.array([TestLines.polyfit_knee(raw) for raw in samples])
-
-        def force(index, knee):
-            raw, slope = samples[index], cls.best_slope(samples[index], knee)
-            return slope * np.sum(raw.y - slope * (raw.u - knee)) / shapes[index].sigma ** 2
-
-        def best_of(members):
-            if len(members) == 1:
-                return zero[members[0]]
-            low, high = zero[members].min(), zero[members].max()
-            return brentq(lambda knee: sum(force(member, knee) for member in members), low, high, xtol=1e-13)
-
-        return pooled(best_of, len(samples), trend)
-
-    def disagreement(self, seed, trend, ordered=1, spread=0.05):
-        """Return disagreements with both referees, of the other branch, of slopes; and how far knees run wrong, V."""
-        pairs, shapes = valve(seed, spread)
-        found = fitted(shapes, trend, ordered=ordered)
-        samples, mine = [pair[ordered] for pair in pairs], [pair[ordered] for pair in shapes]
-        knees, slopes = found.knee[:, ordered], found.slope[:, ordered]
-        best = np.array([self.best_slope(raw, knee) for raw, knee in zip(samples, knees, strict=True)])
-        other = np.array([TestLines.polyfit_knee(pair[1 - ordered]) for pair in pairs])
-        return {
-            "clarabel": np.abs(knees - self.clarabel_knees(samples, mine, slopes, trend)).max(),
-            "pooled": np.abs(knees - self.pooling_knees(samples, mine, trend)).max(),
-            "other branch": np.abs(found.knee[:, 1 - ordered] - other).max(),
-            "slopes": U_MAX * np.abs(slopes / best - 1).max(),
-            "wrong way": 10
-            * max((later - knee) * (1 if trend == "decreasing" else -1) for knee, later in pairwise(knees)),
-        }
-
-    @pytest.mark.parametrize("trend", ["decreasing", "increasing"])
-    @pytest.mark.parametrize("seed", range(10))
-    def test_clarabel_and_pooling_find_the_same(self, seed, trend):
-        for name, difference in self.disagreement(seed, trend, ordered=seed % 2).items():
-            assert difference < SAME, name
-
-    @pytest.mark.parametrize("seed", range(4))
-    def test_knees_that_break_the_order_by_thousands_of_errors(self, seed):
-        """From such a start IPOPT once found no way back, and called the problem infeasible."""
-        for name, difference in self.disagreement(seed, "decreasing", spread=0.3).items():
-            assert difference < SAME, name
-
-    @pytest.mark.parametrize("fault", ["reversed", "left out", "c_uy", "sloppy"])
-    def test_the_referees_see_a_fault(self, fault, monkeypatch, fresh_solvers):
-        original = ca.nlpsol
-
-        def faulty(name, plugin, problem, options):
-            solver = original(name, plugin, {**problem, "g": -problem["g"]}, options)
-
-            def solved(x0, p, lbg, ubg):
-                return solver(x0=x0, p=p, lbg=lbg if fault == "reversed" else -np.inf, ubg=ubg)
-
-            solved.stats, solved.size1_out, solved.get_function = solver.stats, solver.size1_out, solver.get_function
-            return solved
-
-        if fault in ("reversed", "left out"):
-            monkeypatch.setattr(ca, "nlpsol", faulty)
-        if fault == "c_uy":
-            monkeypatch.setattr(fit, "branch_numbers", without("c_uy"))
-        if fault == "sloppy":  # a constraint met to a thousandth of a standard error
-            for name, value in {"tol": 1e-3, "compl_inf_tol": 1e-3, "bound_relax_factor": 1e-3}.items():
-                monkeypatch.setitem(fit_problems.IPOPT, f"ipopt.{name}", value)
-        seen = self.disagreement(1, "decreasing")
-        assert seen["pooled"] > 10 * SAME
-        if fault in ("reversed", "left out"):
-            assert seen["clarabel"] > 1e4 * SAME
-        if fault == "c_uy":
-            assert seen["slopes"] > 10 * SAME
-
-
-@pytest.mark.parametrize("seed", range(12))
-def test_knees_that_run_one_way_by_themselves_are_not_moved_by_that_order(seed):
-    """`order_knees` then takes the free fit, and fits an order to one branch without the other."""
-    _, shapes = valve(seed)
-    free = fitted(shapes, "flat")
-    order = np.argsort(-free.knee[:, 1])
-    ordered = fitted([shapes[row] for row in order], "decreasing", ordered=1)
-    alone = fitted([(None, shapes[row][1]) for row in order], "decreasing", ordered=1)
-    for name in ("knee", "slope"):
-        expected = getattr(free, name)[order]
-        np.testing.assert_allclose(getattr(ordered, name), expected, rtol=SAME)
-        np.testing.assert_allclose(getattr(alone, name)[:, 1], expected[:, 1], rtol=SAME)
-        merged = getattr(alone.with_other_branch(ordered, 0), name)
-        np.testing.assert_allclose(merged, expected, rtol=SAME)
-    np.testing.assert_allclose(alone.knee_se[:, 1], free.knee_se[order, 1], rtol=1e-6)
 
 
 def tobit_knee(samples, sigma, floor, start):
@@ -469,7 +229,7 @@ class TestCensored:
     @staticmethod
     def disagreement(samples, floor, shape=None):
         shape = shape or samples.described()
-        knee = fitted([(shape, None)], "flat", floor).knee[0, 0]
+        knee = fitted([(shape, None)], floor).knee[0, 0]
         return abs(knee - tobit_knee(samples, shape.sigma, floor, (shape.slope, shape.knee)))
 
     @pytest.mark.parametrize("meter", METERS)
@@ -508,7 +268,7 @@ class TestCensored:
         tests = [replace(test, q=np.where(test.q < floor * L_MIN, 0.0, test.q)) for test in tests]
         described = describe_tests(tests, IdentifyOptions(meter_floor=floor * L_MIN))
         shapes = [shape for item in described.tests for shape in item.shapes]
-        knee = fitted([item.shapes for item in described.tests], "flat", described.floor).knee
+        knee = fitted([item.shapes for item in described.tests], described.floor).knee
         expected = [
             tobit_knee(samples, shape.sigma, described.floor, (shape.slope, shape.knee))
             for samples, shape in zip(seen, shapes, strict=True)
@@ -529,6 +289,6 @@ class TestCensored:
             if fault == "all samples' mean":  # of a bin through which the flow comes to the floor: it once stood so
                 everything = bin_branch(samples.u, samples.y, np.zeros(samples.u.size, dtype=bool), U_MAX)
                 shape = replace(shape, bins=replace(shape.bins, u_censored=everything.u))
-            knee = fitted([(shape, None)], "flat", 0.0 if fault == "floor at zero" else floor).knee[0, 0]
+            knee = fitted([(shape, None)], 0.0 if fault == "floor at zero" else floor).knee[0, 0]
             seen.append(abs(knee - expected))
         assert max(seen) > BINNED

@@ -1,15 +1,14 @@
-"""The fits of `identify` against referees that share no code with them: cvxpy, SciPy on raw samples, NumPy."""
+"""The fits of `identify` against referees that share no code with them: SciPy on raw samples, NumPy."""
 
 from dataclasses import replace
 
-import cvxpy
 import numpy as np
 import pytest
 from scipy.optimize import minimize
 from scipy.special import log_ndtr, logsumexp
 
 from dzdesign.identify.fitting import constrained_fits as fit
-from dzdesign.identify.fitting.constrained_fits import fit_knees, fit_offset
+from dzdesign.identify.fitting.constrained_fits import fit_knees
 from dzdesign.identify.knees.gated_line import prepare_branch
 from dzdesign.identify.knees.line_fitting import lay_line
 from dzdesign.identify.knees.prepared_tests import describe_tests
@@ -17,71 +16,9 @@ from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.branches import bin_branch
 from tests.support.synthetic import L_MIN, Truth, synthetic_ramp
 
-#: Clarabel's tolerances; the problems are scaled so that they mean 1e-10 V or less.
-TIGHT = {"tol_gap_abs": 1e-12, "tol_gap_rel": 1e-12, "tol_feas": 1e-12}
 SEED = 20261121
 PRESSURES = (0.5, 1.0, 2.0, 4.0)
 U_MAX = 10.0
-
-
-def solved(problem):
-    problem.solve(solver=cvxpy.CLARABEL, **TIGHT)
-    assert problem.status in (cvxpy.OPTIMAL, cvxpy.OPTIMAL_INACCURATE)
-
-
-# --- the law's offset ---------------------------------------------------------------------------------------
-
-
-def offset_by_cvxpy(guard, se, ceiling, trend):
-    """Nearest offset curve under the ceiling that runs one way, straight from the statement of the problem."""
-    lowest = ceiling.min()
-    given_up = cvxpy.Variable(guard.size)  # in mV under the ceiling: the numbers are then of one size
-    offset = (ceiling - lowest) * 1e3 - given_up
-    # No test outweighs another by more than a hundred standard errors.
-    weight = np.minimum(se.max() / se, 100.0)
-    weight /= weight.max()
-    constraints = [given_up >= 0]
-    steps = cvxpy.diff(offset)
-    constraints += {"decreasing": [steps <= 0], "increasing": [steps >= 0], "flat": [steps == 0]}[trend]
-    misses = cvxpy.multiply(weight, offset - (guard - lowest) * 1e3)
-    solved(cvxpy.Problem(cvxpy.Minimize(cvxpy.sum_squares(misses)), constraints))
-    return lowest + offset.value / 1e3
-
-
-def random_offset_problem(rng):
-    size = int(rng.integers(2, 13))
-    trend = ("decreasing", "increasing", "flat")[rng.integers(3)]
-    guard = 5 + 0.3 * rng.standard_normal(size)
-    se = 10 ** rng.uniform(-4, -1, size)
-    ceiling = guard - 3 * se - rng.uniform(0, 0.1, size)
-    ceiling = {"decreasing": np.minimum.accumulate, "increasing": lambda c: np.minimum.accumulate(c[::-1])[::-1],
-               "flat": lambda c: np.full(size, c.min())}[trend](ceiling)  # fmt: skip
-    if rng.random() < 0.5:  # thresholds below what their neighbours' bounds certify, so that the fit has to choose
-        guard = ceiling + 0.02 * rng.standard_normal(size)
-    return guard, se, ceiling, trend, int(rng.integers(size))
-
-
-def worst_offset_error(count, seed):
-    rng = np.random.default_rng(seed)
-    worst = above = 0.0
-    for _ in range(count):
-        guard, se, ceiling, trend, reference = random_offset_problem(rng)
-        found = fit_offset(guard, se, ceiling, reference, u_max=U_MAX, trend=trend)
-        offset = found.u_min0 * found.beta
-        worst = max(worst, np.abs(offset - offset_by_cvxpy(guard, se, ceiling, trend)).max())
-        above = max(above, (offset - ceiling).max())
-    return worst, above
-
-
-def test_the_offset_is_cvxpys():
-    # Among them are problems that CasADi's own active-set solver calls solved with a curve that runs both ways.
-    worst, above = worst_offset_error(60, SEED)
-    assert worst < 1e-8 and above < 1e-12
-
-
-def test_the_referee_sees_other_weights(monkeypatch):
-    monkeypatch.setattr(fit, "LARGEST_WEIGHT", 1.0)
-    assert worst_offset_error(60, SEED)[0] > 1e-5
 
 
 # --- the knees ----------------------------------------------------------------------------------------------
@@ -116,43 +53,11 @@ def lines_by_numpy(shapes):
     return knees
 
 
-def knees_by_cvxpy(shapes, slopes, trend, ordered):
-    """At given slopes the knees are a convex problem: least squares in them, those of one branch monotone."""
-    start = np.array([[shape.knee for shape in pair] for pair in shapes])
-    moved = cvxpy.Variable((len(shapes), 2))  # mV from the start
-    cost = 0
-    for row, pair in enumerate(shapes):
-        for column, shape in enumerate(pair):
-            bins, slope = shape.bins, slopes[row, column]
-            # sum n (y - slope (u - knee))^2 is a parabola in the knee: its bottom and its curvature say it all.
-            n = bins.n.sum()
-            bottom = np.sum(bins.n * (bins.u - bins.y / slope)) / n
-            curvature = n * (slope / shape.sigma) ** 2 * 1e-6
-            cost += curvature * cvxpy.square(moved[row, column] - 1e3 * (bottom - start[row, column]))
-    steps = cvxpy.diff(1e3 * start[:, ordered] + moved[:, ordered])
-    constraints = [steps <= 0] if trend == "decreasing" else [steps >= 0]
-    solved(cvxpy.Problem(cvxpy.Minimize(cost / len(shapes)), constraints))
-    return start + moved.value / 1e3
-
-
 def test_free_knees_are_the_least_squares_lines():
     group, _ = described()
     shapes = [item.shapes for item in group.tests]
-    found = fit_knees(shapes, floor=0.0, u_max=U_MAX, trend="flat")
+    found = fit_knees(shapes, floor=0.0, u_max=U_MAX)
     assert np.abs(found.knee - lines_by_numpy(shapes)).max() < 1e-8
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_monotone_knees_are_cvxpys(seed):
-    # The second and third run against the trend, so that a constraint is active.
-    group, _ = described(knees=(5.45, 5.40, 5.42, 5.3), seed=seed)
-    shapes = [item.shapes for item in group.tests]
-    found = fit_knees(shapes, floor=0.0, u_max=U_MAX, trend="decreasing", ordered=1)
-    assert found.active == ("falling knee of test 2 to 3",)
-    referee = knees_by_cvxpy(shapes, found.slope, "decreasing", 1)
-    assert np.abs(found.knee - referee).max() < 1e-8
-    wrong_way = knees_by_cvxpy(shapes, found.slope, "increasing", 1)
-    assert np.abs(found.knee - wrong_way).max() > 1e-3
 
 
 def tobit_knee(read, line, shape, floor):
@@ -191,7 +96,7 @@ def worst_tobit_error(seed, floor=0.6, dropping=0.0):
             shape = replace(
                 item.shapes[0], bins=bins, slope=line.slope, knee=line.knee, sigma=line.sigma, dropped=line.dropped
             )
-            found = fit_knees([(shape, None)], floor=group.floor, u_max=U_MAX, trend="flat")
+            found = fit_knees([(shape, None)], floor=group.floor, u_max=U_MAX)
             worst = max(worst, abs(found.knee[0, 0] - tobit_knee(read, line, shape, group.floor)))
             cut += int(bins.censored.sum())
     return worst, cut

@@ -73,7 +73,7 @@ def lower_bounds(
     """
     from scipy.special import stdtrit
 
-    tail = between.tail(confidence, threshold.size)
+    tail = 1 - (1 - confidence) / threshold.size
     degrees = between.degrees_of_freedom(noise_se, DEGREES_OF_FREEDOM)
     # What the repeats scatter by may be less than their noise by chance: the noise alone counts too.
     bounds = [threshold - stdtrit(DEGREES_OF_FREEDOM, 1 - (1 - confidence) / threshold.size) * noise_se]

@@ -1,7 +1,7 @@
-"""The problems of both fits as CasADi sees them, and their solvers: built once per layout, then fed numbers.
+"""The problem of the joint fit as CasADi sees it, and its solver: built once per layout, then fed numbers.
 
 To build a solver takes ten times as long as to solve, for derivatives of the cost are taken symbolically. What a layout
-is, how many branches and which knees must run one way, the valves of a lot share; all else is a parameter.
+is, how many branches and censored bins, the valves of a lot share; all else is a parameter.
 """
 
 from collections.abc import Sequence
@@ -32,9 +32,6 @@ IPOPT: Settings = {
     "ipopt.bound_relax_factor": 0.0,
     "ipopt.nlp_scaling_method": "none",
 }
-#: For DAQP, which solves a convex quadratic programme by its active constraints, in a thirtieth of IPOPT's time. Not
-#: CasADi's qrqp: where ceilings are equal, it may call a curve solved that runs both ways; nor HiGHS, which may hang.
-QUADRATIC: Settings = {"print_time": False, "error_on_fail": False}
 #: Numbers of a branch beside its censored bins: see `branch_numbers`.
 NUMBERS = 9
 #: Standard deviations from which the normal distribution's tail is a continued fraction, exact to 1e-13 with this many
@@ -83,18 +80,13 @@ def branch_numbers(
 
 
 def solver_with_numbers(
-    branches: Sequence[tuple[np.ndarray, np.ndarray]], chain: tuple[int, ...], steps: np.ndarray
+    branches: Sequence[tuple[np.ndarray, np.ndarray]],
 ) -> tuple["ca.Function", np.ndarray]:
-    """Return the solver of a joint fit and the parameters to call it with, from the `branch_numbers` of all branches.
-
-    The knees of the branches in `chain` must run one way. Per step of the chain, `steps` (S, 3) has the distance of the
-    next knee from the one before where the lines have their zeros, and by how much each of the two unknowns adds to it:
-    the solver's constraints bound that distance.
-    """
+    """Return the solver of a joint fit and the parameters to call it with, of the `branch_numbers` of all branches."""
     rows = censored_rows([censored for _, censored in branches])
-    known = [np.array([numbers for numbers, _ in branches]), *rows, steps]
+    known = [np.array([numbers for numbers, _ in branches]), *rows]
     # CasADi stores matrices by column.
-    return _knee_solver(len(branches), rows[0].shape[0], chain), np.concatenate([part.ravel("F") for part in known])
+    return _knee_solver(len(branches), rows[0].shape[0]), np.concatenate([part.ravel("F") for part in known])
 
 
 def censored_rows(censored: Sequence[np.ndarray]) -> tuple[np.ndarray, ...]:
@@ -109,7 +101,7 @@ def censored_rows(censored: Sequence[np.ndarray]) -> tuple[np.ndarray, ...]:
 
 
 @lru_cache(maxsize=KEPT)
-def _knee_solver(branches: int, room: int, chain: tuple[int, ...]) -> "ca.Function":
+def _knee_solver(branches: int, room: int) -> "ca.Function":
     """Return the solver for one layout; its unknowns are the changes of all slopes, then of all knees, in their units.
 
     In changes, a quiet meter's flow, 1e5 standard deviations large, is not subtracted from itself at every step.
@@ -117,7 +109,7 @@ def _knee_solver(branches: int, room: int, chain: tuple[int, ...]) -> "ca.Functi
     import casadi as ca
 
     unknown = ca.MX.sym("unknown", 2 * branches)
-    numbers, steps = ca.MX.sym("numbers", branches, NUMBERS), ca.MX.sym("steps", max(len(chain) - 1, 0), 3)
+    numbers = ca.MX.sym("numbers", branches, NUMBERS)
     count, depth, x = (ca.MX.sym(name, room, branches) for name in ("count", "depth", "x"))
     slopes, knees = unknown[:branches], unknown[branches:]
     per_sigma, slope_unit, knee_unit, n, n_x, n_xx, n_m, n_mx, dropped = ca.horzsplit(numbers)
@@ -129,13 +121,7 @@ def _knee_solver(branches: int, room: int, chain: tuple[int, ...]) -> "ca.Functi
         below = depth - x * ca.repmat(tilt.T, room, 1) - ca.repmat(shift.T, room, 1)
         lost = ca.vec(ca.repmat(dropped.T, room, 1))
         cost -= ca.dot(ca.vec(count), log_shut().map(below.numel())(ca.vec(below).T, lost.T).T)
-    following, before = list(chain[1:]), list(chain[:-1])
-    problem = {
-        "x": unknown,
-        "p": ca.veccat(numbers, count, depth, x, steps),
-        "f": cost,
-        "g": steps[:, 0] + steps[:, 1] * knees[following] + steps[:, 2] * knees[before] if chain else ca.MX(0, 1),
-    }
+    problem = {"x": unknown, "p": ca.veccat(numbers, count, depth, x), "f": cost}
     return ca.nlpsol("knees", "ipopt", problem, IPOPT)
 
 
@@ -177,25 +163,3 @@ def _log_tail(away: "ca.SX | float") -> "ca.SX | float":
     for term in range(TAIL_TERMS, 0, -1):
         fraction = away + term / fraction
     return -(away**2) / 2 - ca.log(fraction)
-
-
-@lru_cache(maxsize=KEPT)
-def offset_solver(size: int) -> "ca.Function":
-    """Return the solver of the offset's fit for so many tests.
-
-    In the offset itself, o = beta u_min0, the problem is a convex quadratic programme; beta(dP0) = 1 then makes u_min0
-    the offset at the reference. The unknowns are what the offset gives up under its ceiling at each test, mV; the
-    parameters the guarded thresholds, the ceilings (mV, from any common zero) and the weights; the constraints bound
-    the steps of the offset from test to test.
-    """
-    import casadi as ca
-
-    given_up, guard, ceiling, weight = (ca.SX.sym(name, size) for name in ("given_up", "guard", "ceiling", "weight"))
-    offset = ceiling - given_up
-    problem = {
-        "x": given_up,
-        "p": ca.vertcat(guard, ceiling, weight),
-        "f": ca.dot(weight, (guard - offset) ** 2),
-        "g": offset[1:] - offset[:-1],
-    }
-    return ca.qpsol("offset", "daqp", problem, QUADRATIC)

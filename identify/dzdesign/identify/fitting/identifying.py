@@ -4,11 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dzdesign.identify.constants import MPA, Premise
+from dzdesign.identify.constants import MPA
 from dzdesign.identify.fitting.constrained_fits import KneeFit
 from dzdesign.identify.fitting.joint_curve import fit_joint_curve
 from dzdesign.identify.knees.described_tests import DescribedTests
 from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.valve.guard_curve import CurvePremise
 from dzdesign.identify.valve.identified_curve import IdentifiedCurve
 
 
@@ -22,7 +23,7 @@ class IdentifiedSide:
 
 
 def identify_curve(
-    group: DescribedTests, knees: KneeFit, premise: Premise, reference: int, options: IdentifyOptions
+    group: DescribedTests, knees: KneeFit, premise: CurvePremise, reference: int, options: IdentifyOptions
 ) -> IdentifiedSide:
     """Identify the curve of a side: straight under the premise `line`, a threshold for each test under another.
 
