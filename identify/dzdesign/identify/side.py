@@ -14,13 +14,13 @@ from dzdesign.identify.data_quality.low_flow import about_low_flow
 from dzdesign.identify.data_quality.side_warnings import find_warnings
 from dzdesign.identify.fit.scatter import Scatter, measure_scatter
 from dzdesign.identify.fitting.certifying import Certified, Tested, certify_thresholds
-from dzdesign.identify.fitting.constrained_fits import KneeFit, fit_knees
 from dzdesign.identify.fitting.guarded_thresholds import (
     GuardedThreshold,
     Guarding,
     assumed_sd,
     departures,
     guard_thresholds,
+    scatter_of_knees,
 )
 from dzdesign.identify.fitting.identifying import identify_curve
 from dzdesign.identify.fitting.low_flow import unseen_of_curve, with_low_flow
@@ -30,6 +30,7 @@ from dzdesign.identify.fitting.zero_flow import allowed_at_zero
 from dzdesign.identify.knees.between_ramps import FEW_DEGREES
 from dzdesign.identify.knees.curve_thinning import recorded_curve
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
+from dzdesign.identify.knees.knee_table import Knees
 from dzdesign.identify.knees.prepared_tests import describe_tests
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_test import RampTest
@@ -65,7 +66,7 @@ def identify_side(
         Where no threshold can be given, with the reason.
     """
     group = describe_tests(tests, options)
-    knees = fit_knees([item.shapes for item in group.tests], floor=group.floor, u_max=options.u_max)
+    knees = Knees.of([item.shapes for item in group.tests])
     reference = _reference(group.tests, options.dp0)
     guarding, lowered = with_low_flow(guard_thresholds(group, knees, options), group, low_flow, options)
     certified = _certify(group, guarding, reference, options)
@@ -131,7 +132,7 @@ def _side_model(
     group: DescribedTests,
     guarding: Guarding,
     certified: dict[Guard, Certified],
-    knees: KneeFit,
+    knees: Knees,
     reference: int,
     options: IdentifyOptions,
     units: RecordedUnits,
@@ -141,7 +142,9 @@ def _side_model(
     described, trend = group.tests, guarding.trend
     guard = next(iter(certified))
     curves: dict[str, CertifiedCurve] = {name: certified[name].curve for name in GUARDS if name in certified}
-    joint = identify_curve(group, knees, curves[guard].premise, reference, options)
+    columns = {name: column for name, column in (("closing", 1), ("opening", 0)) if described[0].shapes[column]}
+    branches = {name: scatter_of_knees(group, knees, column, options) for name, column in columns.items()}
+    joint = identify_curve(group, branches, certified[guard].curves, reference)
     dp0 = described[reference].dp
     several = len(described) > 1
     k_mm = 1 / (options.x_max * 1e3) if options.x_max else None
@@ -219,7 +222,7 @@ def _repeatability(found: Scatter, no_drift: NoDrift) -> Repeatability:
 
 def _test_result(
     group: DescribedTests,
-    knees: KneeFit,
+    knees: Knees,
     row: int,
     guarded: CertifiedCurve,
     options: IdentifyOptions,
@@ -260,7 +263,7 @@ def _test_result(
     )
 
 
-def _thresholds(item: DescribedTest, knees: KneeFit, row: int) -> dict[str, float | None]:
+def _thresholds(item: DescribedTest, knees: Knees, row: int) -> dict[str, float | None]:
     """Return the thresholds of a test under their keys in valve.json; None where a branch was not recorded."""
     values: dict[str, float | None] = {}
     for column, (branch, shape) in enumerate(zip(BRANCHES, item.shapes, strict=True)):

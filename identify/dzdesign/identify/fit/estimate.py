@@ -1,4 +1,4 @@
-"""The estimate of a side: both branches' curves over the pressure drop, drift and flow gain, in one CasADi problem.
+"""The estimate of a side: both branches' curves over the pressure drop, and their drift, in one CasADi problem.
 
     minimise  sum (y - f - d clock)² / (tau² + s²)  over both branches,  f in the class,  closing below opening,
 
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.fit.curve_class import CurveClass
+from dzdesign.identify.fit.curve_class import CurveClass, scatter_of_ramps
 from dzdesign.identify.fit.ramp_model import broken_line
 from dzdesign.identify.fit.scatter import Scatter
 
@@ -31,24 +31,16 @@ KEPT = 16
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SideEstimate:
-    """Curves of the branches on the class's grid, V (N,), in the order that they were given in, and of Eq. (5) beta."""
+    """Curves of the branches on the class's grid, V (N,), in the order that they were given in."""
 
     grid_MPa: np.ndarray
     curves: tuple[np.ndarray, ...]
-    #: Standard errors of the curves, V.
-    curves_se: tuple[np.ndarray, ...]
+    #: Change over the series, V; 0 where the order of the ramps does not tell it.
     drift_V: tuple[float, ...]
 
-    def beta(self, branch: int, dp0_MPa: float) -> tuple[np.ndarray, float]:
-        """Return a branch's curve over its value at dP0, and that value, V."""
-        at = float(np.interp(dp0_MPa, self.grid_MPa, self.curves[branch]))
-        return self.curves[branch] / at, at
 
-
-def estimate_side(branches: Sequence[Scatter], curves: CurveClass, *, direction: int = 0) -> SideEstimate:
+def estimate_side(branches: Sequence[Scatter], curves: CurveClass) -> SideEstimate:
     """Estimate the curves of the closing branch and, behind it, of the opening one.
-
-    `direction` is the way that the firmware's beta is to run (-1, +1; 0: free), a row more of the class.
 
     Raises
     ------
@@ -60,10 +52,6 @@ def estimate_side(branches: Sequence[Scatter], curves: CurveClass, *, direction:
     grid = curves.grid_MPa
     base = float(np.mean(branches[0].model.ramps.y))
     a, low, high = curves.rows()
-    if direction and grid.size > 1:
-        steps = direction * np.diff(np.eye(grid.size), axis=0)
-        a, low = np.vstack([a, steps]), np.append(low, np.zeros(len(steps)))
-        high = np.append(high, np.full(len(steps), np.inf))
     cost, lower, upper = [], [], []
     for scatter in branches:
         ramps = scatter.model.ramps
@@ -94,16 +82,23 @@ def estimate_side(branches: Sequence[Scatter], curves: CurveClass, *, direction:
     return SideEstimate(
         grid_MPa=grid,
         curves=tuple(base + row[:-1] / 1e3 for row in found),
-        curves_se=tuple(_errors(scatter, grid) for scatter in branches),
         drift_V=tuple(float(row[-1]) / 1e3 for row in found),
     )
 
 
-def _errors(scatter: Scatter, grid_MPa: np.ndarray) -> np.ndarray:
-    """Return the standard errors of a branch's curve, V, by the weights of the ramps at the knots."""
+def covariance_of_curve(scatter: Scatter, dp_MPa: np.ndarray, *, straight: bool) -> np.ndarray:
+    """Return the covariance of a branch's curve at pressure drops (T,), V² (T, T), by what each ramp weighs there.
+
+    Of a `straight` curve that is the line's weights, else those of the knots.
+    """
     model = scatter.model
-    weights = broken_line(grid_MPa, model.knots_MPa) @ model.weights[: model.knots_MPa.size]
-    found: np.ndarray = np.sqrt(scatter.variance * np.sum(weights**2, axis=1))
+    knots = model.knots_MPa[[0, -1]] if straight and model.knots_MPa.size > 1 else model.knots_MPa
+    weights = model.weights[: model.knots_MPa.size]
+    if knots.size < model.knots_MPa.size:
+        clock = [model.ramps.clock] if model.drift and model.ramps.clock is not None else []
+        weights = np.linalg.pinv(np.column_stack([broken_line(model.ramps.dp_MPa, knots), *clock]))[:2]
+    at = broken_line(dp_MPa, knots) @ weights
+    found: np.ndarray = (at * scatter_of_ramps(scatter)) @ at.T
     return found
 
 

@@ -59,6 +59,8 @@ class Certified:
     """A certified curve, the scatter of its ramps, and a premise that was asked for and that the tests refuse."""
 
     curve: CertifiedCurve
+    #: The class that its bound rests on.
+    curves: CurveClass
     scatter: Scatter
     refused: PremiseCheck | None
     #: Probability of tests like these if the threshold ran one way; None where they can't tell.
@@ -125,6 +127,7 @@ def _certify(guarded: GuardedThreshold, tested: Tested, *, compared: bool) -> Ce
         one_way_p = lack_of_fit(scatter, curve="monotone", curvature=None, direction=WAYS[tested.direction])
     return Certified(
         curve=_curve(guarded, scatter, bounded, curvature, tuple(checks), tested),
+        curves=bounded.curves,
         scatter=scatter,
         refused=refused,
         one_way_p=one_way_p,

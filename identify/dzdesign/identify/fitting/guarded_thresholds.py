@@ -7,12 +7,13 @@ import numpy as np
 
 from dzdesign.identify.constants import MPA, REFUSED
 from dzdesign.identify.fit.ramp_model import Ramps
+from dzdesign.identify.fit.scatter import Scatter, measure_scatter
 from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, Trend, find_trend, lower_bounds
-from dzdesign.identify.fitting.constrained_fits import KneeFit
 from dzdesign.identify.fitting.guarding import bound_threshold, edges_of_branch, mean_threshold, systematic_change
 from dzdesign.identify.fitting.threshold import Threshold
 from dzdesign.identify.knees.between_ramps import ASSUMED_REPEATABILITY, BetweenRamps
 from dzdesign.identify.knees.described_tests import DescribedTests
+from dzdesign.identify.knees.knee_table import Knees
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.valve.guard_curve import Guard
 from dzdesign.identify.valve.staircase import Direction
@@ -50,12 +51,12 @@ class Guarding:
     column: int
     #: How its guarded threshold runs with the pressure drop.
     trend: Trend
-    knees: KneeFit
+    knees: Knees
     #: Of every guard that the branches allow, the default one first.
     thresholds: dict[Guard, GuardedThreshold]
 
 
-def guard_thresholds(group: DescribedTests, knees: KneeFit, options: IdentifyOptions) -> Guarding:
+def guard_thresholds(group: DescribedTests, knees: Knees, options: IdentifyOptions) -> Guarding:
     """Return the thresholds that may be guarded, and which way the guarded one runs.
 
     The trend is the guarded threshold's: a soft edge whose leak grows with the pressure drop may run against the knees.
@@ -82,28 +83,47 @@ def guard_thresholds(group: DescribedTests, knees: KneeFit, options: IdentifyOpt
 
 
 def _by_ramps(
-    group: DescribedTests, knees: KneeFit, column: int, found: Threshold, confidence: float
+    group: DescribedTests, knees: Knees, column: int, found: Threshold, confidence: float
 ) -> GuardedThreshold:
     """Return a branch's threshold by each ramp: its own knee, less what the threshold lies below the test's knee.
 
-    What the bound of a test takes off beside noise and scatter is a budget of its ramps. A test of which no ramp tells
-    its knee counts as one ramp.
+    What the bound of a test takes off beside noise and scatter is a budget of its ramps.
     """
-    between, known = group.between(column), group.between(column).known
+    between = group.between(column)
     knee, knee_se = knees.knee[:, column], knees.knee_se[:, column]
     statistical = lower_bounds(found.value, knee_se, between, confidence, np.zeros(knee.size))
     # One lag of the meter moves all tests the same way.
     shared = float(np.floor(found.lag_budget.min() * 10**DECIMALS) / 10**DECIMALS)
     budget = np.maximum(statistical - found.bound - shared, 0.0)
+    ramps, sources = _ramps_of(group, knees, column, lower_by=knee - found.value, budget=budget)
+    return GuardedThreshold(threshold=found, between=between, ramps=replace(ramps, shared=shared), sources=sources)
+
+
+def scatter_of_knees(group: DescribedTests, knees: Knees, column: int, options: IdentifyOptions) -> Scatter:
+    """Return the model of a branch's knees by the single ramps, and their scatter."""
+    declared, assumed = assumed_sd(options)
+    nothing = np.zeros(len(group.tests))
+    ramps, _ = _ramps_of(group, knees, column, lower_by=nothing, budget=nothing)
+    return measure_scatter(ramps, declared=declared, assumed=assumed)
+
+
+def _ramps_of(
+    group: DescribedTests, knees: Knees, column: int, *, lower_by: np.ndarray, budget: np.ndarray
+) -> tuple[Ramps, tuple[str, ...]]:
+    """Return the knee of each ramp of a branch, lower by so much at each test (T,), and the names of the ramps.
+
+    A test of which no ramp tells its knee counts as one ramp.
+    """
+    known = group.between(column).known
+    knee, knee_se = knees.knee[:, column], knees.knee_se[:, column]
     untold = np.setdiff1d(np.arange(knee.size), known.test)
     test = np.concatenate([known.test, untold])
-    y = np.concatenate([known.knee, knee[untold]]) + (found.value - knee)[test]
+    y = np.concatenate([known.knee, knee[untold]]) - lower_by[test]
     se = np.sqrt(np.concatenate([known.noise, knee_se[untold] ** 2]))
     when = np.concatenate([known.when, np.full(untold.size, math.nan)])
     sources = [group.tests[row].ramps[number] for row, number in zip(known.test, known.number, strict=True)]
     sources += [group.tests[row].test.source for row in untold]
-    ramps = replace(_rounded(group, test, y, se, when, budget), shared=shared)
-    return GuardedThreshold(threshold=found, between=between, ramps=ramps, sources=tuple(sources))
+    return _rounded(group, test, y, se, when, budget), tuple(sources)
 
 
 def _rounded(

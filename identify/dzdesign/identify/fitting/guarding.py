@@ -5,11 +5,11 @@ import math
 import numpy as np
 
 from dzdesign.identify.fitting.bounds import lower_bounds
-from dzdesign.identify.fitting.constrained_fits import KneeFit
 from dzdesign.identify.fitting.soft_edges import EdgeShapes, find_softness, fit_edge_shapes
 from dzdesign.identify.fitting.threshold import Threshold
 from dzdesign.identify.fitting.zero_flow import with_zero_flow
 from dzdesign.identify.knees.described_tests import DescribedTests
+from dzdesign.identify.knees.knee_table import Knees
 from dzdesign.identify.options import IdentifyOptions
 
 #: Standard errors by which the tail's zero must lie below the knee, in one test or in all together, to be taken for a
@@ -36,7 +36,7 @@ def edges_of_branch(group: DescribedTests, column: int, options: IdentifyOptions
 
 
 def bound_threshold(
-    group: DescribedTests, knees: KneeFit, column: int, edges: EdgeShapes, options: IdentifyOptions
+    group: DescribedTests, knees: Knees, column: int, edges: EdgeShapes, options: IdentifyOptions
 ) -> Threshold:
     """Bound the knee, or below it what a soft edge still passes: the tail's zero, if that lies below by more than its
     error, and where the flow falls to the noise level; or where it comes to the flow that is allowed at zero. `edges`

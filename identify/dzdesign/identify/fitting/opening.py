@@ -5,13 +5,13 @@ from collections.abc import Mapping
 import numpy as np
 
 from dzdesign.identify.fitting.bounds import FINEST_ERROR
-from dzdesign.identify.fitting.constrained_fits import KneeFit
+from dzdesign.identify.knees.knee_table import Knees
 from dzdesign.identify.valve.guard_curve import CertifiedCurve, OpeningCurve
 from dzdesign.identify.valve.staircase import Direction
 
 
 def opening_curve(
-    knees: KneeFit, direction: Direction, guards: Mapping[str, CertifiedCurve], u_max: float
+    knees: Knees, direction: Direction, guards: Mapping[str, CertifiedCurve], u_max: float
 ) -> OpeningCurve | None:
     """Return where useful flow begins on opening, from the knees of the rising branch that run one way.
 
