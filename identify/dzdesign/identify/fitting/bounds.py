@@ -10,8 +10,6 @@ from dzdesign.identify.valve.staircase import Direction
 
 #: Probability, of a flat valve, of a change as large as the one found: a trend is called only below this.
 TREND_SIGNIFICANCE = 0.01
-#: Standard errors by which a knee must depart from the trend to contradict it.
-DEPARTURE_SIGNIFICANCE = 5.0
 #: Blocks of residuals behind a standard error, less the line's two parameters.
 DEGREES_OF_FREEDOM = 14
 #: Errors below this share of u_max weigh alike: an exact table has none.
@@ -52,15 +50,6 @@ def find_trend(
     flat = abs(change) < budget or p_value > TREND_SIGNIFICANCE
     direction: Direction = "flat" if flat else "decreasing" if change < 0 else "increasing"
     return Trend(direction=direction, change=change, change_se=change_se, p_value=p_value)
-
-
-def excess_departure(departure: np.ndarray, se: np.ndarray, budget: float) -> np.ndarray:
-    """Return the departures of the knees from the fit under the trend, V, zero where they lie within their errors.
-
-    The budget is the departure that systematic errors may make, V.
-    """
-    real = departure > np.maximum(DEPARTURE_SIGNIFICANCE * se, budget)
-    return np.where(real, departure, 0.0)
 
 
 def lower_bounds(

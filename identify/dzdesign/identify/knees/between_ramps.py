@@ -101,40 +101,6 @@ class BetweenRamps:
         variance: np.ndarray = self.sd**2 * (1 + lever) + self._noise(noise_se)
         return variance
 
-    @property
-    def measured(self) -> bool:
-        """Whether the scatter was measured on repeats."""
-        return self.origin == "repeats"
-
-    def covariance_of_next(self, noise_se: np.ndarray, weights: np.ndarray, state: float | None) -> np.ndarray:
-        """Return the covariance, V² (N, N), of the next closing (or opening) less N weighted sums of the thresholds.
-
-        As `variance_of_next` has it, for `weights` (N, T); one next closing is common to all sums. A `state` of None
-        counts the noise alone.
-        """
-        if state is None:
-            alone: np.ndarray = (weights * noise_se**2) @ weights.T
-            return alone
-        rows = weights if self.drift is None else np.column_stack([weights, np.full(len(weights), state)])
-        known = self.covariance[: rows.shape[1], : rows.shape[1]]
-        noise = (weights * self._noise(noise_se)) @ weights.T
-        found: np.ndarray = self.sd**2 * (rows @ known @ rows.T + 1.0) + noise
-        return found
-
-    def degrees_of_next(
-        self, noise_se: np.ndarray, weights: np.ndarray, of_noise: float, state: float | None
-    ) -> float:
-        """Return the least effective degrees of freedom of these covariances' diagonal."""
-        if self.measured and state is not None:
-            return self.degrees
-        noise = weights**2 * noise_se**2
-        every = noise.sum(axis=1)
-        if state is not None:
-            every = np.einsum("ni,ij,nj->n", weights, self.covariance_of_mean(noise_se), weights)
-        squares = np.sqrt(np.sum(noise**2, axis=1))
-        share = squares / np.maximum(every, np.finfo(float).tiny)
-        return float(np.min(of_noise / np.maximum(share, SMALLEST_SHARE) ** 2))
-
     def degrees_of_freedom(self, noise_se: np.ndarray, of_noise: float) -> np.ndarray:
         """Return the effective degrees of freedom of these variances (T,) (Welch and Satterthwaite)."""
         if self.origin == "repeats":
