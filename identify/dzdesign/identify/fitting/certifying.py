@@ -12,6 +12,7 @@ from dzdesign.identify.constants import MPA, PREMISES, REFUSED, Premise
 from dzdesign.identify.fit.certificate import ROUNDING_V as ROUNDING
 from dzdesign.identify.fit.certificate import (
     Certificate,
+    NoCurveAgreesError,
     certify,
     continue_above,
     running_minimum,
@@ -112,16 +113,21 @@ def _certify(guarded: GuardedThreshold, tested: Tested, *, compared: bool) -> Ce
     asked, curvature = _asked(options, scatter), None if options.curvature is None else options.curvature * MPA**2
     refused = None
     if asked is not None:
-        check, taken = _checked(scatter, guarded, asked, curvature, tested)
-        if taken is None or (check.lack_of_fit_p is not None and check.lack_of_fit_p < REFUSED):
+        check = _checked(scatter, asked, curvature, tested)
+        if check.lack_of_fit_p is not None and check.lack_of_fit_p < REFUSED:
             asked, refused = None, check
-    bounded = _bound(scatter, asked, curvature, tested)
+    try:
+        bounded = _bound(scatter, asked, curvature, tested)
+    except NoCurveAgreesError:
+        if asked is None:
+            raise
+        bounded, refused = _bound(scatter, None, curvature, tested), check
     checks = []
     several = scatter.model.knots_MPa.size > 1
     for premise in PREMISES if several else ():
         known = premise != "smooth" or curvature is not None or scatter.model.knots_MPa.size >= FEWEST_FOR_BENDS
         if known and (compared or premise == PREMISE_OF[bounded.curves.kind]):
-            checks.append(_checked(scatter, guarded, premise, curvature, tested)[0])
+            checks.append(_checked(scatter, premise, curvature, tested))
     one_way_p = None
     if several and tested.direction != "flat":
         one_way_p = lack_of_fit(scatter, curve="monotone", curvature=None, direction=WAYS[tested.direction])
@@ -154,19 +160,16 @@ def _asked(options: IdentifyOptions, scatter: Scatter) -> Premise | None:
     return "smooth" if options.curvature is not None else options.curve
 
 
-def _checked(
-    scatter: Scatter, guarded: GuardedThreshold, premise: Premise, curvature: float | None, tested: Tested
-) -> tuple[PremiseCheck, _Bounded | None]:
-    """Return how a premise fits the tests and what it would leave, and its bound; None where no curve agrees."""
+def _checked(scatter: Scatter, premise: Premise, curvature: float | None, tested: Tested) -> PremiseCheck:
+    """Return how a premise fits the tests, and the dead zone that it would leave."""
     way = WAYS[tested.direction] if premise == "monotone" else 0
     estimated = premise == "smooth" and curvature is None
     p_value = None if estimated else lack_of_fit(scatter, curve=premise, curvature=curvature, direction=way)
     try:
-        bounded = _bound(scatter, None if estimated else premise, curvature, tested)
+        left = _dead_zone_left(_bound(scatter, None if estimated else premise, curvature, tested), tested)
     except InputError:
-        bounded = None
-    left = None if bounded is None else _dead_zone_left(bounded, tested)
-    return PremiseCheck(premise=premise, lack_of_fit_p=p_value, dead_zone_over_u_max=left), bounded
+        left = None
+    return PremiseCheck(premise=premise, lack_of_fit_p=p_value, dead_zone_over_u_max=left)
 
 
 def _bound(scatter: Scatter, asked: Premise | None, curvature: float | None, tested: Tested) -> _Bounded:
