@@ -1,7 +1,8 @@
 """8b. The families of part 8 through raw recordings: a hundred of each, read, fitted and bounded by the product."""
 
+from collections.abc import Callable
+
 import numpy as np
-from between_ramps import CONFIDENCE, FALLING, FLAT, ORDERS, U_MAX, DP_MPa, SCATTERS_mV
 from recorded_ramps import recorded
 from scipy.stats import binom
 from scoreboard import Row, print_rows, say
@@ -9,6 +10,17 @@ from scoreboard import Row, print_rows, say
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_test import RampTest
+
+U_MAX, CONFIDENCE = 10.0, 0.99
+DP_MPa = np.linspace(1, 5, 6)
+FALLING, FLAT = 4.6 - 0.075 * (DP_MPa - 1), np.full(DP_MPa.size, 4.6)
+SCATTERS_mV = (0.0, 5.0, 12.5, 25.0, 50.0)
+TESTS = np.arange(DP_MPa.size)
+ORDERS: dict[str, Callable[[np.random.Generator], np.ndarray]] = {
+    "closing repeat": lambda rng: np.append(TESTS, 0),
+    "three repeats in random order": lambda rng: rng.permutation(np.repeat(TESTS, 3)),
+    "three rounds": lambda rng: np.tile(TESTS, 3),
+}
 
 RATE_Hz, RAMP_S, NOISE_L_min, TOP_V, HYSTERESIS_V = 20, 100, 0.1, 3.9, 0.1
 

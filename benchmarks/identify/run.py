@@ -14,20 +14,16 @@ for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "POLARS_MAX_THREADS"
 # For the recordings as loggers write them, and for the scoreboard that all benchmarks share.
 sys.path[:0] = [str(Path(__file__).parent / "recordings"), str(Path(__file__).parents[1])]
 
-from above_coverage import print_above_coverage  # noqa: E402
 from accuracy import print_accuracy  # noqa: E402
-from between_ramps import print_between_ramps  # noqa: E402
 from bound_coverage import print_coverage, print_over_compensation, print_residual  # noqa: E402
 from corpus import print_corpus  # noqa: E402
 from corpus_units import print_corpus_of_units  # noqa: E402
-from curve_choice import print_curve_choice  # noqa: E402
-from curve_premises import print_curve_premises  # noqa: E402
 from measured import print_measured  # noqa: E402
 from meters import print_meters  # noqa: E402
+from ramp_families import print_ramp_families  # noqa: E402
 from ramp_series import print_ramp_series  # noqa: E402
 from random_valves import print_random_valves  # noqa: E402
 from reading import print_reading  # noqa: E402
-from recorded_premises import print_recorded_premises  # noqa: E402
 from scoreboard import run_parts  # noqa: E402
 from series_gain import print_series_gain  # noqa: E402
 from soft_edges import print_soft_edges  # noqa: E402
@@ -40,7 +36,7 @@ PARTS = {
     "coverage": (print_coverage, 202),
     "over-compensation": (print_over_compensation, 203),
     "residual": (print_residual, 303),
-    "between-ramps": (print_between_ramps, 808),
+    "ramp-families": (print_ramp_families, 848),
     "ramp-series": (print_ramp_series, 818),
     "series-gain": (print_series_gain, 828),
     "stops": (print_stops, 909),
@@ -48,10 +44,6 @@ PARTS = {
     "corpus": (print_corpus, 909),
     "corpus-units": (print_corpus_of_units, 0),
     "soft-edges": (print_soft_edges, 1313),
-    "premises": (print_curve_premises, 1414),
-    "choice": (print_curve_choice, 1616),
-    "above": (print_above_coverage, 1717),
-    "recorded-premises": (print_recorded_premises, 1515),
     "worn-valves": (print_worn_valves, 1616),
     "random": (print_random_valves, 404),
     "measured": (print_measured, 0),

@@ -1,6 +1,5 @@
 """Figures of the valve and of what is identified: dead zone, thresholds, beta, staircase."""
 
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -110,14 +109,8 @@ def beta(example: Example) -> "Figure":
 
 
 def _steps(axes: "Axes", side: object) -> None:
-    """Draw what is certified between the tests, and the staircase: between two of them the lower of their bounds."""
-    dp, lower = side.curve.dp_MPa, side.curve.u_lower_V
-    for index, step in enumerate(min(pair) for pair in pairwise(lower)):
-        label = "staircase, of --curve monotone" if index == 0 else None
-        axes.plot(dp[index : index + 2], (step, step), color=GREY, lw=2, solid_capstyle="butt", label=label)
-    fine = np.unique([*dp, *np.linspace(dp[0], dp[-1], 901)])
-    bound = side.curve.bound(side.trend).in_doubles(fine)
-    axes.plot(fine, bound, color=GREEN, lw=2.5, label=f"certified bound, --curve {side.curve.premise}")
+    """Draw what is certified at the tests and between them."""
+    axes.plot(side.curve.bound_dp_MPa, side.curve.bound_V, color=GREEN, lw=2.5, label="certified bound")
 
 
 def staircase(example: Example) -> "Figure":
@@ -137,6 +130,6 @@ def staircase(example: Example) -> "Figure":
         panel.set(xlabel="pressure drop (MPa)")
     axes[0].set(ylabel="command (V)", title="the tested interval")
     axes[1].set(title="two tests, enlarged", xlim=(1.85, 3.15), ylim=(5.085, 5.175))
-    note(axes[1], "between two tests the bound\nsags by the curvature", (2.45, 5.145), (2.5, 5.098))
+    note(axes[1], "between two tests the bound\nallows for a bend", (2.45, 5.145), (2.5, 5.098))
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return figure

@@ -14,7 +14,7 @@ def largest_excess_V(compensator: Compensator, codes: int) -> float:
     """Return by how much zero command's drive exceeds the bound at most, each input off by so many codes, V."""
     signals, side = compensator.signals, compensator.side(1)
     guarded = compensator.valve.sides["positive"].certified[side.certificate.guard]
-    bound = guarded.bound(compensator.valve.sides["positive"].trend)
+    bound = guarded.bound()
     first, last = (int(signals.dp_code(Fraction(repr(end)))) for end in (guarded.dp_MPa[0], guarded.dp_MPa[-1]))
     excess = []
     for code in range(first + 1, last):

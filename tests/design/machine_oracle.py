@@ -17,20 +17,11 @@ SIGNS = (-1, 1)
 def bound_V(side, guard: str, dp_MPa: float) -> float:
     """Return the certified bound by the rule that valve.json states, V; infinite outside the tests."""
     curve = side.certified[guard]
-    found = [float("inf")]
-    for row in range(len(curve.dp_MPa) - 1):
-        low, high = curve.dp_MPa[row : row + 2]
-        if not low <= dp_MPa <= high:
-            continue
-        one, other = curve.u_lower_V[row : row + 2]
-        if curve.premise == "monotone":
-            lows = curve.u_lower_V
-            # A threshold that runs one way lies above the lower of what both sides allow.
-            found.append(min(lows[: row + 2]) if side.trend == "increasing" else min(min(lows[: row + 2]), other))
-            continue
-        chord = one + (other - one) * (dp_MPa - low) / (high - low)
-        found.append(chord - curve.curvature_V_MPa2[row] / 2 * (dp_MPa - low) * (high - dp_MPa))
-    return min(found)
+    nodes, bounds = curve.bound_dp_MPa, curve.bound_V
+    for low, high, one, other in zip(nodes, nodes[1:], bounds, bounds[1:], strict=False):
+        if low <= dp_MPa <= high:
+            return one + (other - one) * (dp_MPa - low) / (high - low)
+    return float("inf")
 
 
 def read_codes(compensator, machine, dp_MPa: float, back_MPa: float, converter) -> set[int]:

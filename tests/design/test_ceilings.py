@@ -26,20 +26,19 @@ CODES = SIGNALS.largest_difference(1)
 CLOSE = [Fraction(10**30 + step, 3 * 10**30) for step in (1, 0, 2, 1)]
 
 
-def bound_of(nodes, values, bends):
-    steps = zip(nodes, nodes[1:], values, values[1:], bends, strict=False)
-    return CertifiedBound(pieces=tuple(BoundPiece(low, high, a, b, bend) for low, high, a, b, bend in steps))
+def bound_of(nodes, values):
+    steps = zip(nodes, nodes[1:], values, values[1:], strict=False)
+    return CertifiedBound(pieces=tuple(BoundPiece(*each) for each in steps))
 
 
 def curve_of(seed, *, above=True, hold=True, on_codes=False):
-    """Return a curve under a sagging bound that goes on above the tests; on request with corners on whole codes."""
+    """Return a curve under a bound that goes on above the tests; on request with corners on whole codes."""
     rng = random.Random(seed)
     step = SIGNALS.dp_MPa(1) if on_codes else Fraction(1, 10**7)
     tests = sorted(rng.sample(range(round(Fraction(1, 2) / step), round(6 / step)), 4))
     nodes = [place * step for place in tests]
     lower = [Fraction(rng.randrange(40_000_000, 52_000_000), 10**7) for _ in nodes]
-    bends = [Fraction(rng.randrange(0, 800_000), 10**7) for _ in nodes[1:]]
-    certified = bound_of(nodes, lower, bends)
+    certified = bound_of(nodes, lower)
     between = (nodes[0] + (nodes[-1] - nodes[0]) * share for share in (Fraction(1, 3), Fraction(4, 5)))
     places = sorted({*nodes, *between})
     offset = [certified.at(place) - Fraction(rng.randrange(1, 3_000_000), 10**7) for place in places]
@@ -47,7 +46,7 @@ def curve_of(seed, *, above=True, hold=True, on_codes=False):
     offset = [min(value, lowest) for value in offset]
     further = [nodes[-1] + Fraction(each) for each in (0, Fraction(1, 3), 2, 5, 9)]
     falls = [lower[-1] - Fraction(rng.randrange(0, 9_000_000) * number, 10**7) for number in range(5)]
-    goes_on = bound_of(further, falls, [Fraction(rng.randrange(0, 400_000), 10**7) for _ in falls])
+    goes_on = bound_of(further, falls)
     return OffsetCurve(
         dp_MPa=tuple(places),
         offset_V=tuple(offset),
@@ -123,8 +122,8 @@ def test_doubles_alone_would_be_wrong(monkeypatch):
 def test_a_corner_that_has_one_bound_alone_is_seen(monkeypatch):
     """The fault that the rows' test must see: a bound that jumps at a test has there the lower of both sides."""
     nodes = [SIGNALS.dp_MPa(code) for code in (200, 400, 600)]
-    pieces = (BoundPiece(nodes[0], nodes[1], Fraction(5), Fraction(5), Fraction(0)),
-              BoundPiece(nodes[1], nodes[2], Fraction(4), Fraction(4), Fraction(0)))  # fmt: skip
+    pieces = (BoundPiece(nodes[0], nodes[1], Fraction(5), Fraction(5)),
+              BoundPiece(nodes[1], nodes[2], Fraction(4), Fraction(4)))  # fmt: skip
     curve = OffsetCurve(
         dp_MPa=tuple(nodes), offset_V=(Fraction(4),) * 3, certified=CertifiedBound(pieces=pieces), hold_below_MPa=None
     )

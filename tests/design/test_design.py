@@ -205,3 +205,19 @@ def test_the_closed_loop_has_no_leak_one_per_cent_of_dead_zone_and_reads_what_de
         assert result.reading_opening == pytest.approx(said["opening"], abs=2e-3)
         assert result.reading_closing == pytest.approx(said["closing"], abs=2e-3)
         assert result.residual_opening < result.reading_opening < result.reading_opening_without
+
+
+@pytest.mark.parametrize("curve", [None, "line", "monotone"])
+def test_between_two_pressures_a_premise_must_be_declared(curve):
+    ramps = [synthetic_ramp(dp, Truth(knee_rising=5.5 - 0.05 * dp, slope=4 * dp**0.5)) for dp in (1.0, 5.0)]
+    valve = identify(ramps, IdentifyOptions(meter_lag=0.0, curve=curve))
+    both = valve.positive.curve
+    for dp, low in zip(both.dp_MPa, both.u_lower_V, strict=True):
+        # Of one that runs one way both tests have the lower bound: behind the first it may fall at once.
+        assert 5.2 - 0.05 * (5.0 if curve == "monotone" else dp) < low < 5.4 - 0.05 * dp
+    if curve:
+        assert design(valve).positive.certificate.smallest_margin_V >= 0
+        return
+    assert both.premise == "none" and both.bound().at(Fraction(3)) is None and both.above is None
+    with pytest.raises(InputError, match=r"line leaves a dead zone of .* %, monotone leaves a dead zone of .* %"):
+        design(valve)

@@ -8,6 +8,7 @@ from dzdesign.design.ceiling import offset_ceiling
 from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.lot_setting import lot_setting
 from dzdesign.design.machine import allowance_of
+from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.valve.model import ValveModel
 from tests.support.designs import BOTH_SIGNS, designed
 from tests.support.paths import GOLDENS_FULL
@@ -17,9 +18,9 @@ from tests.support.synthetic import Truth, synthetic_ramp
 BOTH_SIDES = GOLDENS_FULL / "valve.json"
 
 
-def valve(knee, pressures=(1.0, 2.5, 5.0), *, seed=0):
+def valve(knee, pressures=(1.0, 2.5, 5.0), *, seed=0, curve=None):
     tests = [synthetic_ramp(dp, Truth(knee_rising=knee(dp)), seed=seed, rate_Hz=10.0, ramp_s=60.0) for dp in pressures]
-    return identify(tests)
+    return identify(tests, IdentifyOptions(curve=curve))
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +67,9 @@ def test_both_signs():
 
 @pytest.mark.slow
 def test_what_has_no_common_setting_is_told_why(falling, rising, wording):
-    low, high = (designed(valve(lambda dp: 5.4 - 0.05 * dp, pressures)) for pressures in ((0.5, 1.0), (2.0, 4.0)))
+    low, high = (
+        designed(valve(lambda dp: 5.4 - 0.05 * dp, pressures, curve="line")) for pressures in ((0.5, 1.0), (2.0, 4.0))
+    )
     with_transition = designed(falling.valve, transition="2 %")
     for what, batch in {
         "no common pressure drop": {"low": low, "high": high},

@@ -23,7 +23,8 @@ FORBIDDEN = {
 #: not named stands on top.
 FLOORS = {
     "identify": (
-        "constants", "options", "valve", "reading", "ramps", "knees", "fitting", "data_quality", "results", "plots",
+        "constants", "options", "fit", "valve", "reading", "ramps", "knees", "fitting", "data_quality", "results",
+        "plots",
     ),
 }  # fmt: skip
 

@@ -10,10 +10,9 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, find_trend, lower_bounds
-from dzdesign.identify.knees.between_ramps import BetweenRamps, RampKnees, compare_ramps
+from dzdesign.identify.knees.between_ramps import BetweenRamps, RampKnees, pool_scatter
 from dzdesign.identify.knees.meter_floor import find_meter_floor
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.ramps.branches import bin_branch
 from dzdesign.identify.ramps.command import sweep_direction
 from dzdesign.identify.ramps.splitting import split_ramps
 from dzdesign.identify.valve.model import ValveModel
@@ -42,7 +41,7 @@ def without_scatter(count: int) -> BetweenRamps:
     """What tests of one ramp each have between them if the valve is declared to repeat exactly."""
     known = RampKnees(*np.array([(test, 0, 5.0, 0.0, math.nan) for test in range(count)]).T)
     known = dataclasses.replace(known, test=known.test.astype(int), number=known.number.astype(int))
-    return compare_ramps(known, [1] * count, declared=0.0, u_max=10.0)
+    return pool_scatter(known, [1] * count, declared=0.0, u_max=10.0)
 
 
 def falling_threshold(dp: float) -> float:
@@ -131,7 +130,7 @@ class TestLaw:
         side = valve_of(falling_threshold, options=IdentifyOptions(curve=curve)).positive
         assert side.curve.premise == curve
         fine = np.linspace(*side.valid_dp_MPa, 997)
-        bound = side.curve.bound(side.trend).in_doubles(fine)
+        bound = side.curve.bound().in_doubles(fine)
         assert np.all(np.interp(fine, side.curve.offset_dp_MPa, side.curve.offset_V) <= bound + 1e-6)
         assert np.all(bound < falling_threshold(fine) - 0.1)
 
@@ -211,18 +210,6 @@ class TestParts:
         down_up = np.concatenate([np.linspace(10, 0, 500), np.linspace(0, 10, 500)])
         assert np.all(sweep_direction(down_up)[:490] == -1)
         assert np.all(sweep_direction(down_up)[510:] == 1)
-
-    def test_bins_are_sufficient_for_a_line(self):
-        rng = np.random.default_rng(0)
-        u, y = rng.uniform(2, 6, 5000), rng.normal(size=5000)
-        bins = bin_branch(u, y, np.zeros(5000, dtype=bool), 10.0)
-        direct, binned = [], []
-        for slope, knee in ((1.3, 2.2), (0.7, 2.9)):
-            direct.append(np.sum((y - slope * (u - knee)) ** 2))
-            miss = bins.n * (bins.y - slope * (bins.u - knee)) ** 2
-            binned.append(np.sum(miss - 2 * slope * bins.c_uy + slope**2 * bins.c_uu))
-        # But for what no line changes: the squares of y inside the bins.
-        assert np.diff(binned) == pytest.approx(np.diff(direct), rel=1e-10)
 
     @pytest.mark.parametrize(("floor", "expected"), [(0.6, 0.6), (0.0, 0.0)])
     def test_meter_floor_is_found_where_there_is_one(self, floor, expected):

@@ -122,13 +122,15 @@ def excess_of(tests, options=None):
     """Return by how much the bounds of a valve of `by_hand` lie above its thresholds at most, V."""
     side, excess = identify(tests, options).positive, [-np.inf]
     for guard, curve in side.certified.items():
-        ceilings = [curve.bound(side.trend or "flat")]
+        ceilings = [curve.bound()]
         if curve.above is not None and curve.above.certified:
             ceilings.append(curve.above.bound())
         below = {"closing": 0.1, "mean": 0.05, "opening": 0.0}[guard]
         for bound in ceilings:
-            at = np.linspace(*map(float, bound.dp_MPa), 101)
-            excess.append(np.max(bound.in_doubles(at) - (5.5 - 0.03 * at - below)))
+            ends = [float(end) for piece in bound.pieces for end in (piece.from_MPa, piece.to_MPa)]
+            at = np.union1d(np.linspace(*map(float, bound.dp_MPa), 101), ends)
+            known = np.isfinite(bound.in_doubles(at))  # of two pressure drops with nothing declared the tests alone
+            excess.append(np.max(bound.in_doubles(at)[known] - (5.5 - 0.03 * at[known] - below)))
     return max(excess)
 
 

@@ -22,8 +22,11 @@ from dzdesign.design.options import DesignOptions
 from dzdesign.design.signal_text import command_signal, parse_signal, pressure_signal
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import Converter
+from dzdesign.identify.identification import identify
+from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.model import ValveModel
 from tests.support.paths import TESTS
+from tests.support.synthetic import Truth, synthetic_ramp
 
 GOLDENS = TESTS / "goldens"
 FULL = TESTS / "goldens_full"
@@ -119,12 +122,30 @@ def differences(folder: Path, files: Mapping[str, str]) -> str:
     return "".join(said)
 
 
+def golden_valve(root: Path) -> ValveModel:
+    """Identify the valve of a set from ramps of its own: of one side, or of two that are unlike."""
+    drops = (1.0, 3.0, 5.0)
+    if root == GOLDENS:
+        return identify([_ramp(dp, 5.406 - 0.05 * dp, 4.0) for dp in drops])
+    negative = [
+        replace(ramp, u=-ramp.u, q=-ramp.q)
+        for ramp in (_ramp(dp, 3.0 + 0.04 * dp, 3.0, name="synthetic_minus") for dp in drops)
+    ]
+    return identify([*(_ramp(dp, 5.5 - 0.05 * dp, 4.0) for dp in drops), *negative])
+
+
+def _ramp(dp_MPa: float, knee_V: float, slope: float, name: str = "synthetic") -> RampTest:
+    """Return a ramp with that knee and, at 3 MPa, that slope, L/min/V."""
+    truth = Truth(knee_rising=knee_V, slope=slope * (dp_MPa / 3) ** 0.5)
+    return synthetic_ramp(dp_MPa, truth, source=f"{name}_{dp_MPa:g}.csv")
+
+
 def update() -> None:
-    """Design the compensators anew from their valve.json, and write the files."""
+    """Identify and design anew, and write the files."""
     for root, options in ((GOLDENS, None), (FULL, full_options())):
-        content = (root / "valve.json").read_bytes()
-        compensator = design(read_artefact(content, ValveModel, "valve.json"), options)
-        (root / INPUT).write_bytes(to_json_bytes(compensator))
+        valve = golden_valve(root)
+        (root / "valve.json").write_bytes(to_json_bytes(valve))
+        (root / INPUT).write_bytes(to_json_bytes(design(valve, options)))
         for folder in root.iterdir():
             if folder.is_dir() and folder.name != "schemas":
                 shutil.rmtree(folder)

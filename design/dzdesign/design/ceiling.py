@@ -1,6 +1,6 @@
 """The certified offset over the pressure drop, exactly from valve.json; at every code; and what may be put out of it.
 
-At consecutive codes a curve is a polynomial on each span between its nodes: whole numbers over one denominator.
+At consecutive codes a curve is a line on each span between its nodes: whole numbers over one denominator.
 
 Above the highest tested pressure drop the offset is held, lowered with the continued bound, or released. Released means
 a beta of one unit: the compensation ends, and the command drives the valve on. A drive of zero would shut a valve that
@@ -79,7 +79,7 @@ def offset_above(curve: CertifiedCurve, choice: Above, machine: Machine | None) 
         error_MPa = Fraction(repr(machine.bench_pressure_error_MPa)) if machine else NONE
         bound = _drawn_together(continued.bound(), error_MPa)
         return OffsetAbove.under(bound, last_V, certified=continued.certified)
-    held = BoundPiece(last_MPa, last_MPa + FURTHEST_MPa, last_V, last_V, NONE)
+    held = BoundPiece(last_MPa, last_MPa + FURTHEST_MPa, last_V, last_V)
     return OffsetAbove.under(CertifiedBound(pieces=(held,)), last_V, certified=False)
 
 
@@ -99,7 +99,6 @@ def _drawn_together(bound: CertifiedBound, error_MPa: Fraction) -> CertifiedBoun
                 last + (piece.to_MPa - last) / factor,
                 piece.low_V,
                 piece.high_V,
-                piece.curvature * factor**2,
             )
             for piece in bound.pieces
         )
@@ -170,19 +169,19 @@ def certified_V(curve: OffsetCurve, dp_MPa: Fraction) -> Fraction:
     return min(offset, bound)
 
 
-#: Coefficients of 1, x and x².
-Polynomial = tuple[Fraction, Fraction, Fraction]
+#: Value at zero, V, and slope, V/MPa.
+Line = tuple[Fraction, Fraction]
 #: Curve, signals, first and last code of the latest rows. Found again by comparing: a hash of that many fractions takes
 #: longer.
 KNOWN: deque[tuple[OffsetCurve, Signals, int, int, ExactRow]] = deque(maxlen=8)
 
 
 class _Span(NamedTuple):
-    """A curve from the end of the span before up to its own: a polynomial in MPa, V."""
+    """A curve from the end of the span before up to its own: a line."""
 
     #: Pressure drop up to which it goes, itself included; None: all others.
     to_MPa: Fraction | None
-    polynomial: Polynomial
+    line: Line
     #: What it is at most, and at least.
     most_V: Fraction | None = None
     least_V: Fraction | None = None
@@ -220,7 +219,7 @@ def _bounds(curve: OffsetCurve, step: Fraction, first: int, end: int) -> Iterato
     after = floor(curve.dp_MPa[-1] / step) + 1  # the last test has its own bound
     for piece, begin, least_V in [*((each, first, None) for each in tests), *((each, after, NONE) for each in above)]:
         codes = max(ceil(piece.from_MPa / step), begin, first), min(floor(piece.to_MPa / step) + 1, end)
-        yield *codes, _Span(None, _of_piece(piece), least_V=least_V)
+        yield *codes, _Span(None, _chord(piece), least_V=least_V)
 
 
 def offset_row(curve: OffsetCurve, signals: Signals, first: int, last: int) -> ExactRow:
@@ -239,61 +238,39 @@ def _spans(curve: OffsetCurve) -> Iterator[_Span]:
     held = None if hold is None else curve.at(hold)
     inside = (hold,) if hold is not None and nodes[0] < hold < nodes[-1] else ()
     ends = sorted({*nodes, *inside})
-    yield _Span(ends[0], (curve.offset_V[0], NONE, NONE), held)
+    yield _Span(ends[0], (curve.offset_V[0], NONE), held)
     for left, right in pairwise(ends):
         low, high = curve.straight(left), curve.straight(right)
         slope = (high - low) / (right - left)
-        yield _Span(right, (high - slope * right, slope, NONE), held if hold is not None and right <= hold else None)
+        yield _Span(right, (high - slope * right, slope), held if hold is not None and right <= hold else None)
     if curve.above is None:
-        yield _Span(None, (curve.offset_V[-1], NONE, NONE))
+        yield _Span(None, (curve.offset_V[-1], NONE))
         return
     for passed_V, piece in zip(curve.above.least_V, curve.above.bound.pieces, strict=False):
-        most_V = min(passed_V, piece.low_V)
-        if piece.curvature > 0 and piece.from_MPa < (deepest := deepest_MPa(piece)) < piece.to_MPa:
-            yield _Span(deepest, _of_piece(piece), most_V, NONE)
-            most_V = min(most_V, piece.at(deepest))
-        yield _Span(piece.to_MPa, _of_piece(piece), most_V, NONE)
-    yield _Span(None, (NONE, NONE, NONE))
+        yield _Span(piece.to_MPa, _chord(piece), min(passed_V, piece.low_V), NONE)
+    yield _Span(None, (NONE, NONE))
 
 
-def deepest_MPa(piece: BoundPiece) -> Fraction:
-    """Return where a sag is deepest, inside the piece or not, MPa."""
-    slope = (piece.high_V - piece.low_V) / (piece.to_MPa - piece.from_MPa)
-    return (piece.from_MPa + piece.to_MPa) / 2 - slope / piece.curvature
-
-
-def _of_piece(piece: BoundPiece) -> Polynomial:
-    """Return the chord less its sag: M/2 (x - from) (to - x)."""
+def _chord(piece: BoundPiece) -> Line:
+    """Return the chord of a piece of a bound."""
     if piece.from_MPa == piece.to_MPa:
-        return piece.low_V, NONE, NONE
-    slope, sag = (piece.high_V - piece.low_V) / (piece.to_MPa - piece.from_MPa), piece.curvature / 2
-    at_zero = piece.low_V - slope * piece.from_MPa + sag * piece.from_MPa * piece.to_MPa
-    return at_zero, slope - sag * (piece.from_MPa + piece.to_MPa), sag
-
-
-def lowest_places(piece: BoundPiece) -> Iterator[Fraction]:
-    """Yield where a piece of the bound may be lowest, MPa: its ends, and where its sag is deepest if that is inside."""
-    yield piece.from_MPa
-    yield piece.to_MPa
-    if piece.curvature > 0 and piece.from_MPa < (deepest := deepest_MPa(piece)) < piece.to_MPa:
-        yield deepest
+        return piece.low_V, NONE
+    slope = (piece.high_V - piece.low_V) / (piece.to_MPa - piece.from_MPa)
+    return piece.low_V - slope * piece.from_MPa, slope
 
 
 def at_codes(piece: BoundPiece, step: Fraction, codes: range) -> tuple[list[int], int]:
     """Return a piece of a bound at codes, V: whole numbers over one denominator."""
-    return _values(_Span(None, _of_piece(piece)), step, codes)
+    return _values(_Span(None, _chord(piece)), step, codes)
 
 
 def _values(span: _Span, step: Fraction, codes: range) -> tuple[list[int], int]:
     """Return a span at codes, V: whole numbers over one denominator."""
-    parts = [part * step**power for power, part in enumerate(span.polynomial)]
+    parts = [span.line[0], span.line[1] * step]
     limits = [limit for limit in (span.most_V, span.least_V) if limit is not None]
     unit = lcm(DECIMALS.denominator, *(part.denominator for part in (*parts, *limits)))
-    none, one, two = (int(part * unit) for part in parts)
-    if two:
-        found = [none + code * (one + code * two) for code in codes]
-    else:
-        found = [none + code * one for code in codes] if one else [none] * len(codes)
+    none, one = (int(part * unit) for part in parts)
+    found = [none + code * one for code in codes] if one else [none] * len(codes)
     if span.most_V is not None:
         most = int(span.most_V * unit)
         found = [min(value, most) for value in found]

@@ -105,12 +105,28 @@ def guarded_curve(
             'record the ramp test again with a column of dP (or pA and pB), or declare it: identify --dp "1 MPa"'
         )
     curve = _curve_of(side, guard)
+    if curve.premise == "none" and len(curve.dp_MPa) > 1:
+        raise InputError(_nothing_between(side, curve))
     return OffsetCurve(
         dp_MPa=tuple(Fraction(repr(value)) for value in curve.offset_dp_MPa),
         offset_V=tuple(Fraction(repr(value)) for value in curve.offset_V),
-        certified=curve.bound(side.trend or "flat"),
+        certified=curve.bound(),
         hold_below_MPa=hold_below(side, below_dp0),
         above=offset_above(curve, above, machine),
+    )
+
+
+def _nothing_between(side: SideModel, curve: CertifiedCurve) -> str:
+    """Say that a premise between two tests must be declared, and which dead zone each would leave."""
+    leaves = [
+        f"{check.premise} leaves a dead zone of {100 * check.dead_zone_over_u_max:.1f} %"
+        for check in side.curve.premises
+        if check.dead_zone_over_u_max is not None
+    ]
+    left = f" ({', '.join(leaves)})" if leaves else ""
+    return (
+        f"between {len(curve.dp_MPa)} tested pressure drops nothing is known of the threshold; declare what it is "
+        f"there, identify --curve line or --curve monotone{left}, or a --curvature, or record a third pressure drop"
     )
 
 
@@ -260,7 +276,7 @@ def above_in_words(choice: Above, certificate: Certificate, side: SideModel, uni
     holds_to = certificate.holds_to_MPa
     if curve.above is None:
         return f"{text}. Not certified: a single test gives no slope"
-    rests = curve.above.in_words(curve.premise, side.trend or "flat", units)
+    rests = curve.above.in_words(curve.premise)
     if released is not None and holds_to >= released > certificate.dp_MPa[1]:  # no offset is left beyond
         return f"{text}. Up to there this offset is {rests}"
     if holds_to > certificate.dp_MPa[1]:

@@ -13,7 +13,6 @@ from itertools import pairwise
 
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import worded
-from dzdesign.design.ceiling import lowest_places
 from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs_at_tests import falling_corners, flow_at_end, remaining_dead_zone
@@ -115,7 +114,7 @@ def fixed_offset(compensator: Compensator, sign: int = 1) -> FixedOffset:
     guard, machine = compensator.side(sign).certificate.guard, compensator.machine
     curve = guarded_curve(model, guard, compensator.below_dp0, "lower", machine)
     pieces = [*(curve.certified.pieces if curve.certified else ()), *_of_the_lot(compensator, sign)]
-    bounds = [(piece.at(place), place) for piece in pieces for place in lowest_places(piece)]
+    bounds = [(piece.at(end), end) for piece in pieces for end in (piece.from_MPa, piece.to_MPa)]
     if error_MPa := allowance.pressures_MPa.get(BENCH_ERROR):
         highest = curve.dp_MPa[-1] + error_MPa
         bounds.append((curve.at(highest), highest))  # above the tests it never rises

@@ -18,7 +18,7 @@ import numpy as np
 from dzdesign.core.errors import InputError, RequirementError, and_more
 from dzdesign.core.recorded_units import worded
 from dzdesign.design.beta_table import between_nodes, choose_beta_table
-from dzdesign.design.ceiling import OffsetCeiling, OffsetCurve, at_codes, lowest_places, offset_ceiling
+from dzdesign.design.ceiling import OffsetCeiling, OffsetCurve, at_codes, offset_ceiling
 from dzdesign.design.certificate import guarded_curve, with_certificates
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs import costs_of
@@ -263,8 +263,8 @@ def _law(side: _Side, carrier: str, first: Compensator) -> SideLaw:
 def lot_margins(compensator: Compensator) -> tuple[LotMargin, ...]:
     """Return each valve's margin, exactly: at every pressure drop of its tests, under the largest offset read there.
 
-    Between two codes a bound is lowest at one of them, at an end of its piece or where that sags deepest; the codes
-    that may be read there are those of both. Rounding, dither and the machine count as in a ceiling.
+    Between two codes a bound is lowest at one of them or at an end of its piece; the codes that may be read there are
+    those of both. Rounding, dither and the machine count as in a ceiling.
     """
     margins: dict[str, LotMargin] = {}
     for sign in compensator.signals.signs:
@@ -300,7 +300,7 @@ class _Drive:
         signals, (low, high) = self.allowance.signals, self.allowance.window
         ends = [signals.dp_code(end) for end in (piece.from_MPa, piece.to_MPa)]
         codes = range(max(ceil(ends[0]), 0), min(floor(ends[1]) + 1, self.numerators.size))
-        places = list(lowest_places(piece))
+        places = [piece.from_MPa, piece.to_MPa]
         if codes:
             bounds, unit = at_codes(piece, signals.dp_MPa(1), codes)
             up, down = self.allowance.factor / unit, self.unit_V

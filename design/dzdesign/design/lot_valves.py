@@ -10,9 +10,8 @@ from itertools import pairwise
 from typing import Annotated
 
 from dzdesign.core.artefact_types import RuleError, Sha256, quantity
-from dzdesign.identify.constants import Premise
 from dzdesign.identify.valve.certified_bound import CertifiedBound
-from dzdesign.identify.valve.quantity_types import PressureDrop, SecondDifference, Voltage
+from dzdesign.identify.valve.quantity_types import PressureDrop, Voltage
 from dzdesign.identify.valve.side_model import SideModel
 from dzdesign.identify.valve.staircase import Direction
 
@@ -25,24 +24,18 @@ class LotSide:
     """Trend of the threshold over the pressure drop; null if fewer than two pressure drops were tested."""
     confidence: Annotated[float, quantity("1", ge=0.5, le=1)]
     """Joint confidence level of all bounds."""
-    premise: Premise
-    """Premise of the bound between the tests."""
-    curvature_V_MPa2: Annotated[tuple[SecondDifference, ...], quantity("V/MPa2")]
-    """Bound M of the curvature in each interval between neighbouring tests; 0 for line, empty for monotone."""
-    dp_MPa: Annotated[tuple[PressureDrop, ...], quantity("MPa")]
+    tested_MPa: Annotated[tuple[PressureDrop, ...], quantity("MPa")]
     """Tested pressure drops, in ascending order."""
+    dp_MPa: Annotated[tuple[PressureDrop, ...], quantity("MPa")]
+    """Nodes of the bound, in ascending order."""
     u_lower_V: Annotated[tuple[Voltage, ...], quantity("V")]
-    """Lower bound of the threshold at each tested pressure drop."""
+    """Lower bound of the threshold at each node, linear between them."""
 
     def __post_init__(self) -> None:
         if not self.dp_MPa or len(self.dp_MPa) != len(self.u_lower_V):
             raise RuleError(f"{len(self.dp_MPa)} pressure drops have {len(self.u_lower_V)} bounds, expected one each")
-        if any(left >= right for left, right in pairwise(self.dp_MPa)):
+        if any(left >= right for nodes in (self.dp_MPa, self.tested_MPa) for left, right in pairwise(nodes)):
             raise RuleError("the pressure drops of a valve do not rise from test to test")
-        bends = 0 if self.premise == "monotone" else len(self.dp_MPa) - 1
-        if len(self.curvature_V_MPa2) != bends:
-            found = len(self.curvature_V_MPa2)
-            raise RuleError(f"the premise {self.premise} has {found} values of M, expected {bends}")
 
     @classmethod
     def of(cls, side: SideModel, guard: str) -> "LotSide":
@@ -51,16 +44,14 @@ class LotSide:
         return cls(
             trend=side.trend,
             confidence=side.certificate.confidence,
-            premise=curve.premise,
-            curvature_V_MPa2=curve.curvature_V_MPa2,
-            dp_MPa=curve.dp_MPa,
-            u_lower_V=curve.u_lower_V,
+            tested_MPa=curve.dp_MPa,
+            dp_MPa=curve.bound_dp_MPa,
+            u_lower_V=curve.bound_V,
         )
 
     def bound(self) -> CertifiedBound:
         """Return the bound on the whole tested interval, exact."""
-        trend = self.trend or "flat"
-        return CertifiedBound.of(self.premise, self.dp_MPa, self.u_lower_V, self.curvature_V_MPa2, trend)
+        return CertifiedBound.of(self.dp_MPa, self.u_lower_V)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,7 +96,8 @@ class Lacking:
 
 def common_interval(lot: Sequence[LotValve]) -> tuple[float, float] | None:
     """Return the pressure drops that every valve was tested over, MPa; None where there are none, or no valve."""
-    ends = [(side.dp_MPa[0], side.dp_MPa[-1]) for valve in lot for sign in (1, -1) if (side := valve.side(sign))]
+    sides = [side for valve in lot for sign in (1, -1) if (side := valve.side(sign))]
+    ends = [(side.tested_MPa[0], side.tested_MPa[-1]) for side in sides]
     if not ends:
         return None
     low, high = max(low for low, _ in ends), min(high for _, high in ends)
@@ -117,9 +109,9 @@ def lacking_in(lot: Sequence[LotValve]) -> tuple[Lacking, ...]:
     found = []
     for sign in (1, -1):
         tested = {valve.name: side for valve in lot if (side := valve.side(sign))}
-        wanted = _pressures_of_lot([side.dp_MPa for side in tested.values()])
+        wanted = _pressures_of_lot([side.tested_MPa for side in tested.values()])
         for name, side in tested.items():
-            missing = [(low, high) for low, high in wanted if not any(low <= dp <= high for dp in side.dp_MPa)]
+            missing = [(low, high) for low, high in wanted if not any(low <= dp <= high for dp in side.tested_MPa)]
             if missing:
                 middles = tuple(round((low + high) / 2, 6) for low, high in missing)
                 found.append(Lacking(name=name, sign=sign, dp_MPa=middles))
@@ -137,7 +129,7 @@ def without_narrow(
     names = set()
     for each in lacking:
         side = sides[each.name, each.sign]
-        if side and not all(side.dp_MPa[0] < dp < side.dp_MPa[-1] for dp in each.dp_MPa):
+        if side and not all(side.tested_MPa[0] < dp < side.tested_MPa[-1] for dp in each.dp_MPa):
             names.add(each.name)
     before = common_interval(lot)
     after = common_interval([valve for valve in lot if valve.name not in names])

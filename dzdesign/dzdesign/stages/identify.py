@@ -74,8 +74,8 @@ class IdentifyChoices(RampArguments):
     measured on repeated ramps, otherwise 0.25 %)."""
     curve: Annotated[Text, Option("PREMISE", FIT)] = None
     """Premise about the threshold between the tests. line: a straight line against the pressure drop. smooth:
-    curvature at most M. monotone: it runs one way. The default is smooth where a curvature is declared or three or more
-    pressure drops support it, and monotone otherwise."""
+    curvature at most M, or no bend stronger than the tests show. monotone: it runs one way. The default is smooth; with
+    two pressure drops nothing is certified between them."""
     curvature: Annotated[Text, Option("M", FIT, example="20 mV/MPa^2", read=quantity("curvature"))] = None
     """Bound M of the premise smooth, such as "20 mV/MPa^2" (default: estimated from the tests). It bounds the
     threshold's second divided difference, kinks included."""

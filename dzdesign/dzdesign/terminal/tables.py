@@ -182,9 +182,10 @@ def gains_most(side: "SideModel", units: "RecordedUnits") -> str:
     )  # fmt: skip
     at_tests, between = 1e3 * float(np.mean(threshold - bound)), 1e3 * float(np.mean(bound - offset))
     scatter, noise = side.certificate.repeatability, float(np.mean([test.u_knee_se_V for test in side.tests]))
+    budget_V = curve.proof.shared_budget_V + float(np.mean([ramp.budget_V for ramp in curve.proof.ramps]))
     if between > at_tests:
         most = "More pressure drops"
-    elif 2e3 * float(np.mean(curve.errors.budget_V)) > at_tests:
+    elif 2e3 * budget_V > at_tests:
         most = "Slower ramps, or lag and zero of the meter known better,"
     elif scatter.origin == "assumed":
         most = "Repeated ramps, as their scatter is assumed,"

@@ -48,11 +48,11 @@ class IdentifyOptions:
         Standard deviation of the threshold from ramp to ramp, as a share of u_max. None measures it on repeated ramps,
         and assumes 0.25 % without them.
     curve : {"line", "smooth", "monotone"} or None
-        Premise about the threshold between the tests. None selects `smooth` if a curvature is declared. It also selects
-        `smooth` if the tests determine the curvature and either certify more with it or contradict `monotone`.
+        Premise about the threshold between the tests. None selects `smooth`, from three pressure drops on; of two
+        nothing is then certified between them.
     curvature : float or None
-        Bound M of `smooth`: the largest second divided difference of the threshold, V/Pa². None estimates it from the
-        tests.
+        Bound M of `smooth`: the largest second divided difference of the threshold, V/Pa². None limits the bends to
+        those that the tests show.
     dithered : DeclaredDither or None
         Dither that the drive superimposed on the command of every recording. None: no dither, and `design` assumes none
         in the recordings.

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from dzdesign.identify.fitting.constrained_fits import KneeFit
 from dzdesign.identify.knees.described_tests import DescribedTests
+from dzdesign.identify.knees.knee_table import Knees
 from dzdesign.identify.valve.model import ValveModel, Warning_
 from dzdesign.identify.valve.side_model import SideModel
 
@@ -14,7 +14,7 @@ class SideIdentification:
 
     model: SideModel
     described: DescribedTests
-    knees: KneeFit
+    knees: Knees
     warnings: tuple[Warning_, ...]
 
 

@@ -11,18 +11,25 @@ from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits, all_of, wor
 from dzdesign.identify.constants import L_MIN, MPA
 from dzdesign.identify.data_quality.low_flow import about_low_flow
 from dzdesign.identify.data_quality.side_warnings import find_warnings
+from dzdesign.identify.fit.scatter import Scatter, measure_scatter
 from dzdesign.identify.fitting.certifying import Certified, Tested, certify_thresholds
-from dzdesign.identify.fitting.constrained_fits import KneeFit, fit_knees
-from dzdesign.identify.fitting.guarded_thresholds import Guarding, guard_thresholds
+from dzdesign.identify.fitting.guarded_thresholds import (
+    GuardedThreshold,
+    Guarding,
+    assumed_sd,
+    departures,
+    guard_thresholds,
+    scatter_of_knees,
+)
 from dzdesign.identify.fitting.identifying import identify_curve
 from dzdesign.identify.fitting.low_flow import unseen_of_curve, with_low_flow
 from dzdesign.identify.fitting.opening import opening_curve
-from dzdesign.identify.fitting.threshold import Threshold
 from dzdesign.identify.fitting.unknown_threshold import unknown_threshold
 from dzdesign.identify.fitting.zero_flow import allowed_at_zero
-from dzdesign.identify.knees.between_ramps import FEW_DEGREES, BetweenRamps
+from dzdesign.identify.knees.between_ramps import FEW_DEGREES
 from dzdesign.identify.knees.curve_thinning import recorded_curve
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
+from dzdesign.identify.knees.knee_table import Knees
 from dzdesign.identify.knees.prepared_tests import describe_tests
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_test import RampTest
@@ -32,7 +39,7 @@ from dzdesign.identify.valve.low_flow import LowFlow
 from dzdesign.identify.valve.ramp_conditions import conditions_of
 from dzdesign.identify.valve.ramp_result import BRANCHES, TestResult
 from dzdesign.identify.valve.recorded_drop import RecordedDrop, drop_in_words
-from dzdesign.identify.valve.repeatability import Repeatability
+from dzdesign.identify.valve.repeatability import NoDrift, Repeatability
 from dzdesign.identify.valve.side_model import BoundsBasis, Reference, SideModel
 
 #: dP0 names the tested pressure drop within this share of it.
@@ -58,20 +65,21 @@ def identify_side(
         Where no threshold can be given, with the reason.
     """
     group = describe_tests(tests, options)
-    free = fit_knees([item.shapes for item in group.tests], floor=group.floor, u_max=options.u_max, trend="flat")
+    knees = Knees.of([item.shapes for item in group.tests])
     reference = _reference(group.tests, options.dp0)
-    guarding, lowered = with_low_flow(guard_thresholds(group, free, options), group, low_flow, options)
+    guarding, lowered = with_low_flow(guard_thresholds(group, knees, options), group, low_flow, options)
     certified = _certify(group, guarding, reference, options)
-    curve = next(iter(certified.values())).curve
-    knees = guarding.knees if curve.premise == "monotone" else free
+    default = next(iter(certified.values()))
     model = _side_model(group, guarding, certified, knees, reference, options, units, low_flow)
-    departure = np.maximum(guarding.departure, guarding.guarded_departure)
+    departure = departures(
+        next(iter(guarding.thresholds.values())), guarding.trend.direction, default.one_way_p
+    )
     return SideIdentification(
         model=model,
         described=group,
         knees=knees,
         warnings=(
-            *find_warnings(model, group, departure, next(iter(certified.values())), options),
+            *find_warnings(model, group, departure, default, options),
             *about_low_flow(model, lowered),
         ),
     )
@@ -82,19 +90,18 @@ def _certify(
 ) -> dict[Guard, Certified]:
     """Certify the offset of every guard, the default one first."""
     dp = np.array([math.nan if item.dp is None else item.dp / MPA for item in group.tests])
-    opens = guarding.free.knee[:, 0]
+    opens = guarding.knees.knee[:, 0]
     tested = Tested(
         dp_MPa=dp,
         reference=reference,
         direction=guarding.trend.direction,
-        opens_V=np.where(np.isnan(opens), guarding.free.knee[:, 1], opens),
+        opens_V=np.where(np.isnan(opens), guarding.knees.knee[:, 1], opens),
         options=options,
     )
-    between, threshold = group.between(guarding.column), next(iter(guarding.thresholds.values())).ordered
-    _refuse_unlike_repeats(between, threshold)
     try:
         return certify_thresholds(guarding.thresholds, tested)
     except InputError as error:
+        _refuse_unlike_repeats(next(iter(guarding.thresholds.values())), options)
         if why := unknown_threshold(group, guarding):
             raise InputError(why) from error
         raise
@@ -124,7 +131,7 @@ def _side_model(
     group: DescribedTests,
     guarding: Guarding,
     certified: dict[Guard, Certified],
-    knees: KneeFit,
+    knees: Knees,
     reference: int,
     options: IdentifyOptions,
     units: RecordedUnits,
@@ -134,7 +141,9 @@ def _side_model(
     described, trend = group.tests, guarding.trend
     guard = next(iter(certified))
     curves: dict[str, CertifiedCurve] = {name: certified[name].curve for name in GUARDS if name in certified}
-    joint = identify_curve(group, guarding.free, curves[guard].premise, reference, options)
+    columns = {name: column for name, column in (("closing", 1), ("opening", 0)) if described[0].shapes[column]}
+    branches = {name: scatter_of_knees(group, knees, column, options) for name, column in columns.items()}
+    joint = identify_curve(group, branches, certified[guard].curves, reference)
     dp0 = described[reference].dp
     several = len(described) > 1
     k_mm = 1 / (options.x_max * 1e3) if options.x_max else None
@@ -165,15 +174,13 @@ def _side_model(
             level_L_min=level,
             unseen_below_L_min=unseen,
             zero_flow_L_min=None if options.zero_flow is None else options.zero_flow / L_MIN,
-            repeatability=_repeatability(group.between(guarding.column)),
+            repeatability=_repeatability(certified[guard].scatter, group.between(guarding.column).no_drift),
         ),
         low_flow=tuple(low_flow),
         identified=joint.curves,
         certified=curves,
-        opening_curve=opening_curve(guarding.opening, trend.direction, curves, options.u_max)
-        if guarding.opening
-        else None,
-        active_constraints=knees.active + certified[guard].active,
+        opening_curve=opening_curve(knees, trend.direction, curves, options.u_max),
+        active_constraints=certified[guard].active,
     )
 
 
@@ -183,34 +190,38 @@ def _recorded_drop(described: tuple[DescribedTest, ...]) -> RecordedDrop | None:
     return RecordedDrop(columns=columns, sign=described[0].test.dp_sign) if columns else None
 
 
-def _refuse_unlike_repeats(between: BetweenRamps, threshold: Threshold) -> None:
+def _refuse_unlike_repeats(guarded: GuardedThreshold, options: IdentifyOptions) -> None:
     """Refuse repeats that differ so much, and are so few, that the next closing may lie anywhere."""
-    if between.origin == "repeats" and between.degrees < FEW_DEGREES and threshold.bound.min() <= 0:
+    declared, assumed = assumed_sd(options)
+    scatter = measure_scatter(guarded.ramps, declared=declared, assumed=assumed, least=guarded.least_sd)
+    if scatter.origin == "repeats" and scatter.degrees < FEW_DEGREES:
         raise InputError(
             worded(
                 "repeated ramps at one pressure drop differ too much. Their thresholds scatter by {sd:.0f mV} (one "
                 "standard deviation, degrees of freedom: {degrees:.0f}), so no lower bound lies above zero; record two "
                 "more ramps there, or leave out the one that differs from the rest",
-                sd=1e3 * between.sd,
-                degrees=between.degrees,
+                sd=1e3 * math.sqrt(scatter.variance),
+                degrees=scatter.degrees,
             )
         )
 
 
-def _repeatability(found: BetweenRamps) -> Repeatability:
+def _repeatability(found: Scatter, no_drift: NoDrift) -> Repeatability:
+    model = found.model
+    drift_se = math.sqrt(found.variance * float(np.sum(model.weights[-1] ** 2))) if model.drift else None
     return Repeatability(
-        sd_V=found.sd,
+        sd_V=math.sqrt(found.variance if found.origin == "repeats" else max(found.variance - found.noise, 0.0)),
         origin=found.origin,
         degrees_of_freedom=found.degrees if found.origin == "repeats" else None,
-        drift_V=found.drift.change if found.drift else None,
-        drift_se_V=found.drift.change_se if found.drift else None,
-        no_drift=found.no_drift,
+        drift_V=model.drift_V,
+        drift_se_V=drift_se,
+        no_drift="" if model.drift else no_drift or "order of pressure",
     )
 
 
 def _test_result(
     group: DescribedTests,
-    knees: KneeFit,
+    knees: Knees,
     row: int,
     guarded: CertifiedCurve,
     options: IdentifyOptions,
@@ -251,7 +262,7 @@ def _test_result(
     )
 
 
-def _thresholds(item: DescribedTest, knees: KneeFit, row: int) -> dict[str, float | None]:
+def _thresholds(item: DescribedTest, knees: Knees, row: int) -> dict[str, float | None]:
     """Return the thresholds of a test under their keys in valve.json; None where a branch was not recorded."""
     values: dict[str, float | None] = {}
     for column, (branch, shape) in enumerate(zip(BRANCHES, item.shapes, strict=True)):

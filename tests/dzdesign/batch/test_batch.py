@@ -238,15 +238,12 @@ def offsets_above_their_bounds(common, made: Path, names) -> list[str]:
     for name in names:
         side = json.loads((made / "valves" / name / "valve.json").read_text())["sides"]["positive"]
         curve = side["certified"]["closing"]
-        nodes, lower = ([Fraction(repr(value)) for value in curve[key]] for key in ("dp_MPa", "u_lower_V"))
-        bends = [Fraction(repr(value)) for value in curve["curvature_V_MPa2"]] or [None] * (len(nodes) - 1)
+        nodes, lower = ([Fraction(repr(value)) for value in curve[key]] for key in ("bound_dp_MPa", "bound_V"))
         for code in range(common.signals.largest_difference(1) + 1):
             dp = common.signals.dp_MPa(code)
             bounds = [
-                min(low, high)
-                if bend is None
-                else low + (high - low) * (dp - left) / (right - left) - bend / 2 * (dp - left) * (right - dp)
-                for left, right, low, high, bend in zip(nodes, nodes[1:], lower, lower[1:], bends, strict=False)
+                low + (high - low) * (dp - left) / (right - left)
+                for left, right, low, high in zip(nodes, nodes[1:], lower, lower[1:], strict=False)
                 if left <= dp <= right
             ]
             offset = common.beta(code) * common.positive.u_min0_over_u_max * common.u_max_V

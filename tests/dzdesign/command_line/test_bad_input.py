@@ -384,7 +384,7 @@ VALVES = [
     ((*SIDE, "certified", "closing", "offset_V"), []),
     ((*SIDE, "certified", "closing", "offset_V", 0), 9),
     ((*SIDE, "certified", "closing", "premise"), "parabola"),
-    ((*SIDE, "certified", "closing", "curvature_V_MPa2"), [0.1]),
+    ((*SIDE, "certified", "closing", "curvature_V_MPa2"), -0.1),
     ((*SIDE, "certified", "closing", "curvature_is"), "guessed"),
     ((*SIDE, "identified"), {}),
     ((*SIDE, "identified", "closing", "beta_se", 0), -1),

@@ -78,14 +78,12 @@ def check_laws(side):
     assert tuple(side.certified) == GUARDS
     closing, mean, opening = (np.array(side.certified[name].u_lower_V) for name in GUARDS)
     assert np.all(closing <= mean) and np.all(mean <= opening)
-    # The errors of both branches add up in full: the mean of two bounds.
-    np.testing.assert_allclose(mean, (closing + opening) / 2, rtol=0, atol=1e-12)
     dp = np.linspace(side.valid_dp_MPa[0], side.valid_dp_MPa[1], 400)
     edge = np.interp(dp, side.opening_curve.dp_MPa, side.opening_curve.u_V)
     for curve in side.certified.values():
         assert np.all(np.array(curve.u_lower_V) < curve.u_threshold_V)
         offset = offset_at(curve, dp)
-        assert np.all(offset <= curve.bound(side.trend).in_doubles(dp) + 1e-9)
+        assert np.all(offset <= curve.bound().in_doubles(dp) + 1e-9)
         assert np.all(edge >= offset - 1e-9)
     runs = np.diff(side.opening_curve.u_V) * {"decreasing": -1, "increasing": 1, "flat": 0}[side.trend]
     assert np.all(runs >= 0) and (side.trend != "flat" or not np.any(np.diff(side.opening_curve.u_V)))
@@ -137,26 +135,6 @@ def test_what_was_not_recorded_is_not_guarded():
     assert list(falling.certified) == ["closing"] and falling.opening_curve is None
     one = identify([dataclasses.replace(ramps(OPENS["flat"], pressures=(1.0,))[0], dp=None)]).positive
     assert set(one.certified) == set(GUARDS) and one.opening_curve is None and one.certified["mean"].beta == ()
-
-
-def test_a_rising_branch_that_contradicts_the_trend_pays_for_it():
-    """The opening threshold zigzags by 60 mV about one that falls; the closing one falls all the way."""
-    away = dict(zip(PRESSURES, (0.0, 0.03, -0.03, 0.0), strict=True))
-    tests = [
-        synthetic_ramp(
-            dp, Truth(knee_rising=5.5 - 0.01 * dp - way, hysteresis=0.1 - way, slope=4 * dp**0.5), rate_Hz=20
-        )
-        for dp, way in away.items()
-    ]
-    honest = [synthetic_ramp(dp, Truth(knee_rising=5.5 - 0.01 * dp, slope=4 * dp**0.5), rate_Hz=20) for dp in PRESSURES]
-    one_way = dataclasses.replace(REPEATABLE, curve="monotone")
-    odd, even = (identify(each, one_way).positive for each in (tests, honest))
-    assert odd.trend == even.trend == "decreasing"
-    truth = np.array([5.5 - 0.01 * dp - way for dp, way in away.items()])
-    assert np.all(np.array(odd.certified["opening"].u_lower_V) < truth)
-    lowered = np.array(even.certified["opening"].u_lower_V) - odd.certified["opening"].u_lower_V
-    assert np.all(lowered > 0.015)
-    assert odd.certified["closing"].u_lower_V == pytest.approx(even.certified["closing"].u_lower_V, abs=5e-3)
 
 
 #: Bounds at 90 % that hold together fail in at most a tenth of the valves: in 13 of 60 or more with p < 1 %.
@@ -275,7 +253,7 @@ def test_verify_holds_the_core_against_the_bounds_of_its_own_guard(tmp_path, mon
     for test in ramps(OPENS["decreasing"], pressures=(1.0, 3.0)):
         columns = {"time_s": test.time, "u_V": test.u, "dP_MPa": test.dp / MPA, "Q_Lmin": test.q / L_MIN}
         Path(test.source).write_bytes(ramp_file_bytes(columns, (), compress=False))
-    assert main(["identify", *sorted(str(path) for path in Path().glob("*.csv"))]) == 0
+    assert main(["identify", *sorted(str(path) for path in Path().glob("*.csv")), "--curve", "line"]) == 0
     assert main(["design", "valve.json", "--guard", "mean"]) == 0
     assert main(["codegen", "compensator.json", "-o", "firmware"]) == 0
     capsys.readouterr()

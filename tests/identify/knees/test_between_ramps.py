@@ -10,10 +10,8 @@ from scipy.stats import chi2
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
-from dzdesign.identify.fitting.bounds import lower_bounds
+from dzdesign.identify.fit import certificate, ramp_model, scatter
 from dzdesign.identify.identification import identify
-from dzdesign.identify.knees import between_ramps
-from dzdesign.identify.knees.between_ramps import BetweenRamps, RampKnees, compare_ramps
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.splitting import Ramp
 from dzdesign.identify.reading.ramp_files import ramp_file_bytes
@@ -113,40 +111,8 @@ class TestScatter:
         taken = series(shuffled(4), scatter=0.02, seed=4)
         following = np.array([closes_at(dp) for dp in PRESSURES]) - 0.04
         assert (bounds(taken.tests) < following).all()
-        monkeypatch.setattr(BetweenRamps, "variance_of_next", lambda self, noise_se, state: noise_se**2)
+        monkeypatch.setattr(certificate, "_critical", lambda *given: 0.1)
         assert (bounds(taken.tests) > following).any()
-
-
-class TestCoverage:
-    """The bound of the next closing at every test, straight from knees: at 99 % 20 of 2000 families are expected."""
-
-    @staticmethod
-    def failures(repeats, scatter, declared=None):
-        rng = np.random.default_rng([repeats, round(1e4 * scatter)])
-        test, noise_se = np.tile(np.arange(4), repeats), 1e-3
-        failed = 0
-        for knees in 5 + math.hypot(scatter, noise_se) * rng.standard_normal((2000, test.size)):
-            number, unknown = np.repeat(np.arange(repeats), 4), np.full(test.size, np.nan)
-            known = RampKnees(test, number, knees, np.full(test.size, noise_se**2), unknown)
-            between = compare_ramps(known, [repeats] * 4, declared=declared, u_max=10.0)
-            mean = np.bincount(test, weights=knees) / repeats
-            bound = lower_bounds(mean, np.full(4, noise_se / math.sqrt(repeats)), between, 0.99, np.zeros(4))
-            failed += bool(np.any(5 + scatter * rng.standard_normal(4) < bound))
-        return failed
-
-    CASES = pytest.mark.parametrize(("repeats", "declared"), [(1, 0.01), (2, None), (3, None)])
-
-    @CASES
-    def test_it_fails_no_more_often_than_stated(self, repeats, declared):
-        assert self.failures(repeats, 0.01, declared) <= 34
-
-    @CASES
-    def test_the_mean_in_place_of_the_next_is_seen(self, repeats, declared, monkeypatch):
-        def of_mean(self, noise_se, state):
-            return np.diag(self.covariance_of_mean(noise_se))
-
-        monkeypatch.setattr(BetweenRamps, "variance_of_next", of_mean)
-        assert self.failures(repeats, 0.01, declared) > 34
 
 
 class TestWithoutRepeats:
@@ -195,7 +161,7 @@ class TestDeclared:
         assert "repeatability" in codes(taken.tests, repeatability=1e-4)
         assert bounds(taken.tests, repeatability=1e-4) == pytest.approx(bounds(taken.tests))
         # Seeded: a check that never contradicts lets 1 mV stand for 25 mV.
-        monkeypatch.setattr(between_ramps, "CONTRADICTED", 0.0)
+        monkeypatch.setattr(scatter, "CONTRADICTED", 0.0)
         assert found(taken.tests, repeatability=1e-4).origin == "declared"
         assert (bounds(taken.tests, repeatability=1e-4) > bounds(taken.tests, repeatability=None) + 0.04).all()
 
@@ -230,9 +196,8 @@ class TestDrift:
         taken = series((0, 1, 2, 3, 0), drift=-0.08, seed=8)
         lowest = np.array([closes_at(dp) for dp in PRESSURES]) - 0.04
         assert (bounds(taken.tests, repeatability=2e-4) < lowest).all()
-        unknown = lambda known, count: (np.zeros(known.test.size), "order unknown")  # noqa: E731
-        monkeypatch.setattr(between_ramps, "_series_clock", unknown)
-        monkeypatch.setattr(between_ramps, "CONTRADICTED", 0.0)
+        monkeypatch.setattr(ramp_model, "TELLS_DRIFT", 1e9)
+        monkeypatch.setattr(scatter, "CONTRADICTED", 0.0)
         assert (bounds(taken.tests, repeatability=2e-4) > lowest).any()
 
     def test_none_is_said_of_a_valve_that_has_none(self):

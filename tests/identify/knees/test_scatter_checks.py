@@ -1,4 +1,4 @@
-"""The premises of the scatter from ramp to ramp: equal at all pressures, normal, independent; and what they are for."""
+"""The premises of the scatter from ramp to ramp: independent, no copies, one population; and what they are for."""
 
 from dataclasses import replace
 
@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from dzdesign.identify.fitting.bounds import lower_bounds
+from dzdesign.identify.fit import scatter
+from dzdesign.identify.fit.certificate import certify
+from dzdesign.identify.fit.curve_class import find_class
+from dzdesign.identify.fit.ramp_model import Ramps
 from dzdesign.identify.identification import identify
 from dzdesign.identify.knees import scatter_checks
-from dzdesign.identify.knees.between_ramps import RampKnees, compare_ramps
+from dzdesign.identify.knees.between_ramps import RampKnees, pool_scatter
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_files import read_ramp_file
 from tests.identify.knees.test_between_ramps import (
@@ -17,7 +20,6 @@ from tests.identify.knees.test_between_ramps import (
     PRESSURES,
     bounds,
     codes,
-    found,
     series,
     shuffled,
     side_of,
@@ -32,14 +34,7 @@ def compared(knees, order, *, dated=True, noise=NOISE_SE):
     number = np.array([np.sum(order[:at] == one) for at, one in enumerate(order)])
     when = np.arange(order.size, dtype=float) if dated else np.full(order.size, np.nan)
     known = RampKnees(order, number, knees, np.full(order.size, noise**2), when)
-    return compare_ramps(known, np.bincount(order).tolist(), declared=None, u_max=10.0)
-
-
-def bounded(between, knees, order):
-    """Return the bounds of undated ramps."""
-    counts = np.bincount(order)
-    mean = np.bincount(order, weights=knees) / counts
-    return lower_bounds(mean, NOISE_SE / np.sqrt(counts), between, 0.99, np.zeros(TESTS))
+    return pool_scatter(known, np.bincount(order).tolist(), declared=None, u_max=10.0)
 
 
 class TestSize:
@@ -49,70 +44,20 @@ class TestSize:
     @pytest.mark.parametrize("dated", [True, False])
     def test_it_refuses_no_more_often_than_it_may(self, repeats, dated):
         rng, count = np.random.default_rng([repeats, dated]), 1000
-        refused = np.zeros(3, dtype=int)
+        refused = 0
         for _ in range(count):
             order = rng.permutation(np.repeat(np.arange(TESTS), repeats))
             checks = compared(5 + 0.01 * rng.standard_normal(order.size), order, dated=dated).checks
-            refused += [one is not None for one in (checks.largest, checks.outlying, checks.serial)]
-        assert (refused <= binom.isf(1e-4, count, scatter_checks.REFUSED)).all()
-
-    def test_noise_that_differs_between_pressures_is_no_scatter(self):
-        rng, refused = np.random.default_rng(3), 0
-        order = np.repeat(np.arange(TESTS), 3)
-        noise_se = np.array([8e-3, 3e-3, 1e-3, 0.5e-3])[order]
-        for _ in range(500):
-            known = RampKnees(
-                order,
-                np.tile(np.arange(3), TESTS),
-                5 + noise_se * rng.standard_normal(12),
-                noise_se**2,
-                np.full(12, np.nan),
-            )
-            between = compare_ramps(known, [3] * TESTS, declared=None, u_max=10.0)
-            refused += between.checks.largest is not None
-        assert refused <= binom.isf(1e-4, 500, scatter_checks.REFUSED)
+            refused += checks.serial is not None
+        assert refused <= binom.isf(1e-4, count, scatter_checks.REFUSED)
 
     def test_copies_of_one_recording_refuse_nothing(self):
         order = np.repeat(np.arange(TESTS), 3)
         checks = compared(5.0 + 0.1 * order, order).checks
-        assert checks.largest is None and checks.outlying is None and checks.serial is None
+        assert checks.serial is None
 
 
 class TestUnequalScatter:
-    """One pressure drop scatters ten times as much as the others: five repeats, one next closing at each test."""
-
-    @staticmethod
-    def failures(count=1000):
-        rng, order = np.random.default_rng(11), np.repeat(np.arange(TESTS), 5)
-        sds, failed = np.array([5e-3, 5e-3, 5e-3, 50e-3]), 0
-        for _ in range(count):
-            knees = 5 + sds[order] * rng.standard_normal(order.size)
-            bound = bounded(compared(knees, order, dated=False), knees, order)
-            failed += bool(np.any(5 + sds * rng.standard_normal(TESTS) < bound))
-        return failed
-
-    def test_the_bound_is_that_of_the_largest(self):
-        # Expected 1 % and what the test misses, 0.2 %.
-        assert self.failures() <= binom.isf(1e-4, 1000, 0.012)
-
-    def test_pooled_untested_it_fails_and_is_seen(self, monkeypatch):
-        monkeypatch.setattr(scatter_checks, "REFUSED", 0.0)
-        assert self.failures() > 50
-
-    def test_the_largest_by_itself_needs_no_allowance_for_the_others(self):
-        """Of the largest of several scatters one tail is enough, also where all scatter alike: three repeats each."""
-        rng, order, failed = np.random.default_rng(12), np.repeat(np.arange(TESTS), 3), {}
-        for wild in (1, 2, TESTS):
-            sds, failed[wild] = np.where(np.arange(TESTS) < wild, 50e-3, 1e-6), 0
-            for _ in range(1000):
-                knees = 5 + sds[order] * rng.standard_normal(order.size)
-                each = [knees[order == test] for test in range(TESTS)]
-                largest = max(one.std(ddof=1) for one in each)
-                width = 6.965 * largest * np.sqrt(4 / 3)  # Student, 2 degrees of freedom, 99 %
-                mean = np.array([one.mean() for one in each])
-                failed[wild] += bool(np.any(5 + sds * rng.standard_normal(TESTS) < mean - width))
-        assert max(failed.values()) <= binom.isf(1e-4, 1000, 0.01)
-
     def test_it_is_found_in_recordings_and_said_where(self):
         rng = np.random.default_rng(13)
         order = shuffled(13)
@@ -122,9 +67,10 @@ class TestUnequalScatter:
             taken.tests[place] = moved(taken.tests[place], off + 1e-3 * rng.standard_normal())
         unlike = series(order, scatter=0.003, seed=13).tests
         assert "unequal-scatter" in codes(taken.tests) and "unequal-scatter" not in codes(unlike)
-        assert found(taken.tests).degrees_of_freedom < 2.1 and found(taken.tests).sd_V > 0.04
-        assert (bounds(taken.tests) < bounds(unlike) - 0.2).all()
-        assert "few-repeats" not in codes(taken.tests)
+        curve = side_of(taken.tests).curve
+        assert curve.proof.unlike_knot == len(PRESSURES) - 1 and curve.proof.sd_V < 0.01
+        lower = bounds(unlike) - bounds(taken.tests)
+        assert lower[-1] > 0.2 and (lower[:-1] < 0.1).all()
 
 
 def moved(test, by):
@@ -143,7 +89,7 @@ class TestOutlyingRamp:
     def warned(tests):
         return warned(tests, "outlying-ramp")
 
-    def test_it_is_named_and_counts(self, wording):
+    def test_it_is_named_and_set_aside(self, wording):
         taken = series(self.ORDER, scatter=0.003, seed=14)
         assert not self.warned(taken.tests)
         before = side_of(taken.tests)
@@ -153,19 +99,21 @@ class TestOutlyingRamp:
         wording("between ramps: outlying", warning.text)
         after = side_of(taken.tests)
         assert sum(len(test.ramps) for test in after.tests) == len(self.ORDER)
-        assert after.certificate.repeatability.sd_V > 3 * before.certificate.repeatability.sd_V
+        (aside,) = after.curve.proof.set_aside
+        assert aside.source == "ramp04.csv" and abs(aside.distance_V) == pytest.approx(0.08, abs=0.02)
+        assert after.certificate.repeatability.sd_V < 2 * before.certificate.repeatability.sd_V
 
-    def test_of_two_that_differ_both_are_named(self, wording):
+    def test_of_two_that_differ_the_lower_one_counts(self):
         order = shuffled(15, tuple(range(len(PRESSURES))) * 2)
         taken = series(order, scatter=0.002, seed=15, dated=False)
         taken.tests[3] = moved(taken.tests[3], 0.1)
-        pair = [f"ramp{place:02d}.csv" for place, row in enumerate(order) if row == order[3]]
+        (other,) = [place for place, row in enumerate(order) if row == order[3] and place != 3]
         (warning,) = self.warned(taken.tests)
-        assert warning.source == pair[0] and pair[1] in warning.text
-        wording("between ramps: one of two outlies", warning.text)
+        assert warning.source == f"ramp{other:02d}.csv"
+        assert bounds(taken.tests)[order[3]] < taken.closings[3] - 0.1
 
     def test_a_check_that_is_off_is_seen(self, monkeypatch):
-        monkeypatch.setattr(scatter_checks, "REFUSED", 0.0)
+        monkeypatch.setattr(scatter, "OUTLYING", 0.0)
         taken = series(self.ORDER, scatter=0.003, seed=14)
         taken.tests[4] = moved(taken.tests[4], 0.08)
         assert not self.warned(taken.tests)
@@ -250,15 +198,6 @@ class TestSerialScatter:
         assert seen > 150
 
 
-def test_the_largest_scatter_keeps_the_premise_of_one_tail():
-    order = np.repeat(np.arange(TESTS), 5)
-    knees = 5 + np.random.default_rng(18).standard_normal(order.size) * np.array([1e-3, 1e-3, 1e-3, 0.05])[order]
-    between = compared(knees, order, dated=False)
-    assert between.checks.largest.test == TESTS - 1
-    assert between.tail(0.99, TESTS) == 0.99
-    assert compared(5 + 1e-3 * np.sin(7.0 * order), order).tail(0.99, TESTS) == pytest.approx(0.9975)
-
-
 class TestTwoGroups:
     """Ramps of two sides, benches or places are said to be two; the normal scatter of one valve is not."""
 
@@ -305,9 +244,12 @@ class TestTwoGroups:
         order = np.repeat(np.arange(TESTS), repeats)
         number = np.tile(np.arange(repeats), TESTS)
         knees = 5.1 + 1e-3 * np.random.default_rng(repeats).standard_normal(order.size) + 0.5 * (number >= lower)
-        between = compared(knees, order, dated=False, noise=1e-4)
-        assert between.checks.groups
-        assert (bounded(between, knees, order) < 5.1).all()
+        groups = compared(knees, order, dated=False, noise=1e-4).checks.groups
+        assert groups
+        ramps = Ramps(dp_MPa=1.0 + order, y=knees, se=np.full(order.size, 1e-4))
+        found = scatter.measure_scatter(ramps, declared=None, assumed=0.025, least=groups.apart / 2)
+        assert not found.set_aside
+        assert (certify(found, find_class(found, curve=None, curvature=None)).bound < 5.1).all()
 
     def test_a_valve_that_closes_at_two_places_by_chance_is_two(self):
         said = 0

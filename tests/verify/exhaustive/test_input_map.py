@@ -27,7 +27,7 @@ def test_the_drawn_bound_is_that_of_the_check(example_tests, monkeypatch, premis
     valve = identify(example_tests, IdentifyOptions(curve=premise))
     compensator = design(valve, default_options())
     bounds = guarded_bounds(compensator, 1)
-    assert bounds.premise == premise
+    assert valve.positive.curve.premise == premise
     lowered = replace(bounds, u_lower_V=tuple(bound - lowered_V for bound in bounds.u_lower_V))
     monkeypatch.setattr(all_inputs, "guarded_bounds", lambda *_: lowered)
 

@@ -18,7 +18,7 @@ from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
-from dzdesign.design.lot_setting import lot_margins, lot_setting, prove_lot
+from dzdesign.design.lot_setting import lot_setting, prove_lot
 from dzdesign.design.lot_valves import Lacking, LotSide, common_interval, lacking_in, without_narrow
 from dzdesign.design.options import options_of
 from dzdesign.design.redesign import prove_derived
@@ -69,22 +69,14 @@ def with_bound(compensator, name, place, change):
     return replace(compensator, lot=tuple(lot))
 
 
-def deepest_places(curve):
-    """Return the pressure drops at which a sagging bound is deepest: there the slope of chord and sag cancel."""
-    for piece in curve.certified.pieces:
-        if piece.curvature:
-            width = piece.to_MPa - piece.from_MPa
-            yield piece.from_MPa + width / 2 - (piece.high_V - piece.low_V) / width / piece.curvature
-
-
 def slow_margin(compensator, each):
     """Return a valve's margin by its own curve, code by code."""
     signals, curve = compensator.signals, guarded_curve(each.valve.positive, "closing", "hold")
     low, high = signals.difference_error(1)
     kept = Fraction(1, 2 * signals.compare_max)
-    margins, between = [], [*curve.dp_MPa, *deepest_places(curve)]
+    margins, between = [], [end for piece in curve.certified.pieces for end in (piece.from_MPa, piece.to_MPa)]
     for code in range(signals.largest_difference(1) + 1):
-        # The ends of the tests stand for themselves, they are tested, and so do the deepest places: between two codes.
+        # The nodes of the bound stand for themselves where they lie between two codes.
         ends = [dp for dp in between if signals.dp_MPa(code + low) <= dp <= signals.dp_MPa(code + high)]
         places = [*(signals.dp_MPa(code + error) for error in range(low, high + 1)), *ends]
         bounds = [bound for bound in map(curve.bound, places) if bound is not None]
@@ -111,18 +103,6 @@ def test_a_valve_whose_bound_is_lower_makes_it_fail_and_is_named(common, name, w
         prove_lot(low)
     with wording.refusal(InputError):
         prove_derived(low)
-
-
-def test_a_step_counts_on_its_own_interval_only():
-    """The rising valve's last bound holds nowhere: below the last test only that of the one before is known.
-
-    Held above the tests, the offset rises with that valve, so that it is over the one before where that is lowered.
-    """
-    held = lot_setting(four_valves(above="hold"))
-    assert held.carrier == "b" and lot_margins(with_bound(held.compensator, "b", 2, -5.0)) == held.margins
-    lower = {each.name: each for each in lot_margins(with_bound(held.compensator, "b", 1, -0.3))}
-    assert lower["b"].margin_V < 0 and 2.5 <= lower["b"].dp_MPa <= 5.01
-    assert {name: lower[name] for name in "acd"} == {each.name: each for each in held.margins if each.name != "b"}
 
 
 # ---- the file ----
@@ -162,7 +142,7 @@ def test_a_bound_that_somebody_raised_is_refused(document, wording):
     [
         lambda lot: lot[:1],
         lambda lot: [lot[0], *lot[:3]],
-        lambda lot: [replace(lot[0], positive=replace(lot[0].positive, dp_MPa=(5.0, 2.5, 1.0))), *lot[1:]],
+        lambda lot: [replace(lot[0], positive=replace(lot[0].positive, dp_MPa=lot[0].positive.dp_MPa[::-1])), *lot[1:]],
     ],
 )
 def test_a_lot_that_can_be_none_is_refused(common, change, wording):
@@ -237,8 +217,7 @@ def test_of_a_valves_own_setting_there_is_nothing_to_compare(batch):
 
 
 def valve_tested(common, name, *places):
-    premise = {"premise": "monotone", "curvature_V_MPa2": ()}
-    bounds = LotSide(trend="flat", confidence=0.99, **premise, dp_MPa=places, u_lower_V=(5.0,) * len(places))
+    bounds = LotSide(trend="flat", confidence=0.99, tested_MPa=places, dp_MPa=places, u_lower_V=(5.0,) * len(places))
     return replace(common.compensator.lot[0], name=name, positive=bounds)
 
 

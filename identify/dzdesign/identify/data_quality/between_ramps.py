@@ -1,13 +1,18 @@
 """What the recordings leave open from ramp to ramp: no repeats, unlike ones, an order that hides a drift, a drift."""
 
+import math
 from collections.abc import Iterator, Sequence
 
+from dzdesign.identify.constants import MPA
 from dzdesign.identify.data_quality.catalogue import Finding, warn
+from dzdesign.identify.fit.scatter import Scatter
 from dzdesign.identify.knees.between_ramps import ASSUMED_REPEATABILITY, FEW_DEGREES
 from dzdesign.identify.knees.described_tests import DescribedTest
 from dzdesign.identify.knees.scatter_checks import ScatterChecks
 from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.valve.bound_proof import BoundProof
 from dzdesign.identify.valve.repeatability import Repeatability
+from dzdesign.identify.valve.side_model import SideModel
 
 #: Standard errors from which a drift is said, and share of u_max from which it matters.
 DRIFT_SIGNIFICANCE, SMALLEST_DRIFT = 3.0, 1e-3
@@ -16,9 +21,14 @@ SMALLEST_DISTANCE, SMALLEST_SCATTER = 1e-3, 5e-4
 
 
 def about_ramps(
-    found: Repeatability, checks: ScatterChecks, tests: Sequence[DescribedTest], options: IdentifyOptions
+    side: SideModel,
+    scatter: Scatter,
+    checks: ScatterChecks,
+    tests: Sequence[DescribedTest],
+    options: IdentifyOptions,
 ) -> Iterator[Finding]:
     """Yield the warnings about what differs from ramp to ramp, on the guarded branch."""
+    found, proof = side.certificate.repeatability, side.curve.proof
     count = len(tests)
     sd_mV, degrees = 1e3 * found.sd_V, found.degrees_of_freedom
     if found.origin == "assumed":
@@ -29,9 +39,9 @@ def about_ramps(
     elif degrees is not None and options.repeatability is not None:
         percent = 100 * found.sd_V / options.u_max
         yield warn("repeatability", sd_mV=sd_mV, percent=percent, declared=100 * options.repeatability)
-    elif degrees is not None and degrees < FEW_DEGREES and not checks.largest:
+    elif degrees is not None and degrees < FEW_DEGREES and not scatter.unlike:
         yield warn("few-repeats", sd_mV=sd_mV, differences=degrees)
-    yield from _about_premises(found, checks, tests, options.u_max)
+    yield from _about_premises(found, scatter, checks, tests, proof, options.u_max)
     if found.no_drift == "order of pressure" or (found.no_drift == "order unknown" and count > 1):
         yield warn("order", None, "unknown" if found.no_drift == "order unknown" else "of-pressure")
     if found.drift_V is not None and found.drift_se_V is not None:
@@ -41,10 +51,15 @@ def about_ramps(
 
 
 def _about_premises(
-    found: Repeatability, checks: ScatterChecks, tests: Sequence[DescribedTest], u_max: float
+    found: Repeatability,
+    scatter: Scatter,
+    checks: ScatterChecks,
+    tests: Sequence[DescribedTest],
+    proof: BoundProof,
+    u_max: float,
 ) -> Iterator[Finding]:
     """Yield what the repeats say against a scatter that is normal, alike at all pressure drops, and independent."""
-    largest, outlying, alike, groups = checks.largest, checks.outlying, checks.alike, checks.groups
+    alike, groups, unlike = checks.alike, checks.groups, scatter.unlike
     if groups and groups.apart > SMALLEST_DISTANCE * u_max:
         low, high = (tests[test].ramps[number] for test, number in groups.ramps)
         yield warn(
@@ -65,18 +80,18 @@ def _about_premises(
             sd_mV=1e3 * alike.sd,
             noise_mV=1e3 * alike.of_noise,
         )
-    if largest and found.origin == "repeats":
+    if unlike:
+        knot_MPa = scatter.model.knots_MPa[unlike.knot]
+        nearest = min(tests, key=lambda test: abs((test.dp or 0.0) / MPA - knot_MPa))
         yield warn(
             "unequal-scatter",
-            tests[largest.test].test.source,
-            sd_mV=1e3 * largest.sd,
-            others_mV=1e3 * largest.of_others,
-            differences=largest.degrees,
+            nearest.test.source,
+            sd_mV=1e3 * math.sqrt(unlike.variance),
+            others_mV=1e3 * found.sd_V,
+            differences=unlike.degrees,
         )
-    if outlying and abs(outlying.distance) > SMALLEST_DISTANCE * u_max:
-        names = [tests[test].ramps[number] for test, number in outlying.ramps]
-        case, distance_mV = "one" if len(names) == 1 else "pair", 1e3 * outlying.distance
-        said = {"distance_mV": distance_mV, "apart_mV": abs(distance_mV), "ratio": outlying.ratio}
-        yield warn("outlying-ramp", names[0], case, other=names[-1], **said)
+    for ramp in proof.set_aside:
+        if abs(ramp.distance_V) > SMALLEST_DISTANCE * u_max:
+            yield warn("outlying-ramp", ramp.source, distance_mV=1e3 * ramp.distance_V, ratio=ramp.deviations)
     if checks.serial is not None and found.sd_V > SMALLEST_SCATTER * u_max:
         yield warn("serial-scatter", correlation=checks.serial)

@@ -48,12 +48,11 @@ def find_warnings(
     """
     return (
         *about_the_meter(side, group, options),
-        *about_ramps(side.certificate.repeatability, _checks(side, group), group.tests, options),
+        *about_ramps(side, certified.scatter, _checks(side, group), group.tests, options),
         *(
             warn(
                 "not-monotone",
                 test.source,
-                "premise" if side.curve.premise == "monotone" else "other-premise",
                 gap_mV=1e3 * float(gap),
             )
             for test, gap in zip(side.tests, departure, strict=True)
@@ -75,21 +74,9 @@ def find_warnings(
 
 
 def _about_premises(side: SideModel, certified: Certified) -> Iterator[Finding]:
-    refused, vertex, taken = certified.refused, certified.vertex, side.curve.premise
+    refused, taken = certified.refused, side.curve.premise
     if refused:
-        yield warn("premise-refused", premise=refused.premise, p=refused.lack_of_fit_p, taken=taken)
-    if vertex:
-        yield warn(
-            "vertex-between-tests",
-            None,
-            "premise" if taken == "monotone" else "other-premise",
-            low_MPa=vertex.from_MPa,
-            high_MPa=vertex.to_MPa,
-            at_MPa=vertex.at_MPa,
-            depth_mV=1e3 * vertex.depth_V,
-            p=vertex.p_value,
-            taken=taken,
-        )
+        yield warn("premise-refused", premise=refused.premise, p=refused.lack_of_fit_p or 0.0, taken=taken)
 
 
 def _checks(side: SideModel, group: DescribedTests) -> ScatterChecks:

@@ -10,8 +10,6 @@ from dzdesign.identify.valve.staircase import Direction
 
 #: Probability, of a flat valve, of a change as large as the one found: a trend is called only below this.
 TREND_SIGNIFICANCE = 0.01
-#: Standard errors by which a knee must depart from the trend to contradict it.
-DEPARTURE_SIGNIFICANCE = 5.0
 #: Blocks of residuals behind a standard error, less the line's two parameters.
 DEGREES_OF_FREEDOM = 14
 #: Errors below this share of u_max weigh alike: an exact table has none.
@@ -54,15 +52,6 @@ def find_trend(
     return Trend(direction=direction, change=change, change_se=change_se, p_value=p_value)
 
 
-def excess_departure(departure: np.ndarray, se: np.ndarray, budget: float) -> np.ndarray:
-    """Return the departures of the knees from the fit under the trend, V, zero where they lie within their errors.
-
-    The budget is the departure that systematic errors may make, V.
-    """
-    real = departure > np.maximum(DEPARTURE_SIGNIFICANCE * se, budget)
-    return np.where(real, departure, 0.0)
-
-
 def lower_bounds(
     threshold: np.ndarray, noise_se: np.ndarray, between: BetweenRamps, confidence: float, budget: np.ndarray
 ) -> np.ndarray:
@@ -73,7 +62,7 @@ def lower_bounds(
     """
     from scipy.special import stdtrit
 
-    tail = between.tail(confidence, threshold.size)
+    tail = 1 - (1 - confidence) / threshold.size
     degrees = between.degrees_of_freedom(noise_se, DEGREES_OF_FREEDOM)
     # What the repeats scatter by may be less than their noise by chance: the noise alone counts too.
     bounds = [threshold - stdtrit(DEGREES_OF_FREEDOM, 1 - (1 - confidence) / threshold.size) * noise_se]

@@ -1,37 +1,46 @@
-"""From guarded thresholds to certified curves: the premise that is taken, its bound, and the law's offset under it."""
+"""From guarded thresholds to certified curves: the class that is taken, its bound, and the law's offset under it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from dzdesign.core.artefact_types import own_result
 from dzdesign.core.errors import InputError, InternalError
-from dzdesign.core.recorded_units import Worded, worded
-from dzdesign.identify.constants import MPA, REFUSED, Premise
-from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, FINEST_ERROR
-from dzdesign.identify.fitting.constrained_fits import fit_offset
-from dzdesign.identify.fitting.continuing import AtTests, bound_above
-from dzdesign.identify.fitting.error_statement import budget_of_free, stated_errors
-from dzdesign.identify.fitting.guarded_thresholds import GuardedThreshold
-from dzdesign.identify.fitting.offsets import OffsetUnderBound, fit_offset_under
-from dzdesign.identify.fitting.premises import bound_line, find_curvature
-from dzdesign.identify.fitting.vertices import Vertex, find_vertex
+from dzdesign.core.recorded_units import worded
+from dzdesign.identify.constants import MPA, PREMISES, REFUSED, Premise
+from dzdesign.identify.fit.certificate import ROUNDING_V as ROUNDING
+from dzdesign.identify.fit.certificate import (
+    Certificate,
+    NoCurveAgreesError,
+    certify,
+    continue_above,
+    running_minimum,
+)
+from dzdesign.identify.fit.curve_class import FEWEST_FOR_BENDS, CurveClass, Kind, find_class, lack_of_fit
+from dzdesign.identify.fit.scatter import Scatter, measure_scatter
+from dzdesign.identify.fitting.guarded_thresholds import DECIMALS, GuardedThreshold, assumed_sd
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.valve.above_tests import AboveTests
-from dzdesign.identify.valve.certified_bound import CertifiedBound
-from dzdesign.identify.valve.estimated_curvature import FEWEST_FOR_CURVATURE
-from dzdesign.identify.valve.guard_curve import CertifiedCurve, Guard, PremiseCheck
+from dzdesign.identify.valve.bound_proof import BoundProof
+from dzdesign.identify.valve.guard_curve import CertifiedCurve, CurvePremise, Guard, PremiseCheck
 from dzdesign.identify.valve.quantity_types import LARGEST_BETA
-from dzdesign.identify.valve.staircase import Direction, staircase
+from dzdesign.identify.valve.staircase import Direction
+
+#: The premise of each class, as valve.json names it.
+PREMISE_OF: dict[Kind, CurvePremise] = {
+    "bends": "smooth", "line": "line", "smooth": "smooth", "monotone": "monotone", "points": "none"
+}  # fmt: skip
+WAYS: dict[Direction, int] = {"decreasing": -1, "flat": 0, "increasing": 1}
+#: Largest pressure drop that valve.json holds, MPa, and what a bound is at least, V.
+LARGEST_MPa, LOWEST_V = 1e3, -1e3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tested:
     """What all guards of a side have in common."""
 
-    #: Pressure drops of the tests, MPa, rising; empty where it is unknown.
+    #: Pressure drops of the tests, MPa, rising; NaN where it is unknown.
     dp_MPa: np.ndarray
     #: Index of the test at dP0.
     reference: int
@@ -40,78 +49,39 @@ class Tested:
     opens_V: np.ndarray
     options: IdentifyOptions
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BoundUnderPremise:
-    """Simultaneous bounds at the tests under one premise, V (T,), and what holds between them."""
-
-    premise: Premise
-    value: np.ndarray
-    se: np.ndarray
-    lower: np.ndarray
-    #: M between neighbouring tests, V/MPa²; empty for `monotone`.
-    curvature: np.ndarray
-    p_value: float | None
-    #: Where the tests show, significantly, that a threshold that is to be `monotone` is lowest between two of them.
-    vertex: Vertex | None = None
-
     @property
-    def refused(self) -> bool:
-        """Whether the tests contradict the premise."""
-        return self.p_value is not None and self.p_value < REFUSED
-
-
-def bounds_under_premises(guarded: GuardedThreshold, tested: Tested) -> dict[Premise, BoundUnderPremise]:
-    """Return the bounds under every premise that these tests allow to be taken, the strongest first."""
-    free, between, dp, options = guarded.free, guarded.between, tested.dp_MPa, tested.options
-    covariance = between.covariance_of_mean(free.se) + (FINEST_ERROR * options.u_max) ** 2 * np.eye(dp.size)
-    degrees = float(between.degrees_of_freedom(free.se, DEGREES_OF_FREEDOM).min())
-    found = [_monotone(guarded, find_vertex(dp, free.value, covariance, degrees))]
-    declared = None if options.curvature is None else options.curvature * MPA**2
-    if dp.size > 1 and (dp.size >= FEWEST_FOR_CURVATURE or options.curvature is not None):
-        bends = find_curvature(dp, free.value, covariance, degrees, declared)
-        smooth = BoundUnderPremise(
-            premise="smooth", value=free.value, se=free.se, lower=free.bound, curvature=bends.allowed,
-            p_value=bends.p_value,
-        )  # fmt: skip
-        found.insert(0, smooth)
-    if dp.size > 1:
-        budget = budget_of_free(guarded, options.confidence)
-        fit = bound_line(dp, free.value, free.se, budget, between, confidence=options.confidence, u_max=options.u_max)
-        line = BoundUnderPremise(
-            premise="line", value=fit.value, se=free.se, lower=fit.bound, curvature=np.zeros(dp.size - 1),
-            p_value=fit.p_value,
-        )  # fmt: skip
-        found.insert(0, line)
-    return {each.premise: each for each in found}
-
-
-def _monotone(guarded: GuardedThreshold, vertex: Vertex | None) -> BoundUnderPremise:
-    """Return the bounds of a threshold that runs one way: two tests, of its steps and between them, each at 1 %."""
-    ordered = guarded.ordered
-    tested = [p for p in (guarded.one_way_p, vertex.p_value if vertex else None) if p is not None]
-    return BoundUnderPremise(
-        premise="monotone", value=ordered.value, se=ordered.se, lower=ordered.bound, curvature=np.zeros(0),
-        p_value=min(tested, default=None),
-        vertex=vertex if vertex and vertex.significant else None,
-    )  # fmt: skip
+    def with_dp(self) -> bool:
+        """Whether the pressure drops are known."""
+        return not bool(np.isnan(self.dp_MPa).any())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Certified:
-    """A certified curve, which constraints of its offset hold with equality, and what the tests say against premises.
-
-    `refused` is a premise that was asked for; the `vertex` contradicts the curve, or what would certify more.
-    """
+    """A certified curve, the scatter of its ramps, and a premise that was asked for and that the tests refuse."""
 
     curve: CertifiedCurve
-    active: tuple[str, ...]
+    #: The class that its bound rests on.
+    curves: CurveClass
+    scatter: Scatter
     refused: PremiseCheck | None
-    vertex: Vertex | None
+    #: Probability of tests like these if the threshold ran one way; None where they can't tell.
+    one_way_p: float | None
+    #: Where the offset lies on the bound, in words.
+    active: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Bounded:
+    """A class, its certificate, and the offset on its nodes, V."""
+
+    curves: CurveClass
+    certificate: Certificate
+    bound: np.ndarray
+    offset: np.ndarray
 
 
 def certify_thresholds(thresholds: Mapping[Guard, GuardedThreshold], tested: Tested) -> dict[Guard, Certified]:
-    """Fit the law's offset under the bound of the first threshold, which must succeed, and of others.
+    """Certify the offset under the bound of the first threshold, which must succeed, and of others.
 
     One of the others whose bounds leave no positive offset is left out: `design` then refuses that guard and says which
     there are.
@@ -124,7 +94,7 @@ def certify_thresholds(thresholds: Mapping[Guard, GuardedThreshold], tested: Tes
     curves: dict[Guard, Certified] = {}
     for name, threshold in thresholds.items():
         try:
-            curves[name] = _certify(threshold, tested)
+            curves[name] = _certify(threshold, tested, compared=not curves)
         except (InputError, InternalError):  # a guard beside the default one is left out
             if not curves:
                 raise
@@ -132,163 +102,179 @@ def certify_thresholds(thresholds: Mapping[Guard, GuardedThreshold], tested: Tes
 
 
 @own_result()
-def _certify(guarded: GuardedThreshold, tested: Tested) -> Certified:
-    """Take the premise that is asked for, or the strongest of the default ones, unless the tests refuse it."""
-    bounds = bounds_under_premises(guarded, tested)
-    offsets: dict[Premise, OffsetUnderBound] = {}
-    failures: dict[Premise, InputError] = {}
-    for premise, bound in bounds.items():
-        try:
-            offsets[premise] = _fit_offset(bound, tested)
-        except InputError as error:
-            failures[premise] = error
-    checks = {premise: _check(bound, offsets.get(premise), tested) for premise, bound in bounds.items()}
-    one_way = not (guarded.departs or bounds["monotone"].refused)
-    taken, refused = _take(bounds, offsets, _asked(tested.options), one_way=one_way)
-    if taken not in offsets:
-        raise _too_much_sag(bounds[taken]) or failures[taken]
-    bound, offset, vertex = bounds[taken], offsets[taken], bounds["monotone"].vertex
-    declared: Literal["declared", "estimated"] = "declared" if tested.options.curvature is not None else "estimated"
-    with_dp = tested.dp_MPa.size > 0 and not np.isnan(tested.dp_MPa).any()
-    value = np.maximum(bound.value, bound.lower)
-    curve = CertifiedCurve(
-        premise=taken,
-        premises=tuple(checks.values()),
-        curvature_V_MPa2=tuple(map(float, bound.curvature)),
-        curvature_is=declared if taken == "smooth" else None,
-        dp_MPa=tuple(map(float, tested.dp_MPa)) if with_dp else (),
-        u_threshold_V=tuple(map(float, value)),
-        u_lower_V=tuple(map(float, bound.lower)),
-        errors=stated_errors(guarded, taken, bound.se, value, bound.lower, tested.options.confidence),
-        u_min0_V=offset.u_min0,
-        offset_dp_MPa=tuple(map(float, offset.dp_MPa)) if with_dp else (),
-        offset_V=tuple(map(float, offset.offset)),
-        above=_above(bound, guarded, tested) if with_dp and tested.dp_MPa.size > 1 else None,
-    )
-    costs = taken == "monotone" or ("monotone" in offsets and offsets["monotone"].mean > offset.mean)
+def _certify(guarded: GuardedThreshold, tested: Tested, *, compared: bool) -> Certified:
+    """Take the premise that is asked for, unless the tests refuse it; else what bends from test to test.
+
+    `compared` states beside it what the other premises would leave.
+    """
+    options = tested.options
+    declared, assumed = assumed_sd(options)
+    scatter = measure_scatter(guarded.ramps, declared=declared, assumed=assumed, least=guarded.least_sd)
+    asked, curvature = _asked(options, scatter), None if options.curvature is None else options.curvature * MPA**2
+    refused = None
+    if asked is not None:
+        check = _checked(scatter, asked, curvature, tested)
+        if check.lack_of_fit_p is not None and check.lack_of_fit_p < REFUSED:
+            asked, refused = None, check
+    try:
+        bounded = _bound(scatter, asked, curvature, tested)
+    except NoCurveAgreesError:
+        if asked is None:
+            raise
+        bounded, refused = _bound(scatter, None, curvature, tested), check
+    checks = []
+    several = scatter.model.knots_MPa.size > 1
+    for premise in PREMISES if several else ():
+        known = premise != "smooth" or curvature is not None or scatter.model.knots_MPa.size >= FEWEST_FOR_BENDS
+        if known and (compared or premise == PREMISE_OF[bounded.curves.kind]):
+            checks.append(_checked(scatter, premise, curvature, tested))
+    one_way_p = None
+    if several and tested.direction != "flat":
+        one_way_p = lack_of_fit(scatter, curve="monotone", curvature=None, direction=WAYS[tested.direction])
     return Certified(
-        curve=curve, active=offset.active, refused=checks[refused] if refused else None,
-        vertex=vertex if costs else None,
-    )  # fmt: skip
-
-
-def _above(bound: BoundUnderPremise, guarded: GuardedThreshold, tested: Tested) -> AboveTests:
-    """Continue the bound above the last test."""
-    dp, lower = tested.dp_MPa, bound.lower
-    whole = CertifiedBound.of(bound.premise, dp.tolist(), lower.tolist(), bound.curvature.tolist(), tested.direction)
-    at_tests = AtTests(
-        premise=bound.premise,
-        trend=tested.direction,
-        dp_MPa=dp,
-        value=np.maximum(bound.value, lower),
-        last_lower=float(whole.pieces[-1].at(whole.dp_MPa[1])),
+        curve=_curve(guarded, scatter, bounded, curvature, tuple(checks), tested),
+        curves=bounded.curves,
+        scatter=scatter,
+        refused=refused,
+        one_way_p=one_way_p,
+        active=_active(bounded),
     )
-    return bound_above(at_tests, guarded, tested.options)
 
 
-def _asked(options: IdentifyOptions) -> Premise | None:
-    """Return the premise that the engineer states: who declares a curvature states `smooth`."""
-    return "smooth" if options.curvature is not None else options.curve
-
-
-def _take(
-    bounds: Mapping[Premise, BoundUnderPremise],
-    offsets: Mapping[Premise, OffsetUnderBound],
-    asked: Premise | None,
-    *,
-    one_way: bool,
-) -> tuple[Premise, Premise | None]:
-    """Return the premise to take, and the one that was asked for but that the tests refuse.
-
-    By default `smooth`, where its curvature can be told and it certifies more, on average, than `monotone`: a curvature
-    that the tests know too badly supports nothing. But it certifies the less the more the tests bend, so where they
-    bend to a vertex between two of them it is taken whatever it certifies; so it is where they do not run `one_way`.
+def _asked(options: IdentifyOptions, scatter: Scatter) -> Premise | None:
+    """Return the premise that the engineer states: who declares a curvature states `smooth`.
 
     Raises
     ------
     InputError
-        If the premise that is asked for needs more tests, or if the tests show a vertex and no curvature is supported.
+        If a curvature is to be estimated from too few tests.
     """
-    # One that runs the wrong way has paid for it: its bounds are lowered.
-    refused = asked if asked in ("line", "smooth") and asked in bounds and bounds[asked].refused else None
-    if asked is not None and asked not in bounds:
-        raise InputError(
-            f"--curve {asked} with {next(iter(bounds.values())).lower.size} pressure drop(s): a curvature is estimated "
-            f"from {FEWEST_FOR_CURVATURE} or more; declare it by --curvature, or record more tests"
-        )
-    if asked is not None and refused is None:
-        return asked, None
-    smooth, vertex = bounds.get("smooth"), bounds["monotone"].vertex
-    if refused == "smooth" or smooth is None or smooth.refused or "smooth" not in offsets:
-        if vertex:
-            raise InputError(_no_premise(vertex))
-        return "monotone", refused
-    better = vertex or not one_way or "monotone" not in offsets or offsets["smooth"].mean > offsets["monotone"].mean
-    return ("smooth" if better else "monotone"), refused
-
-
-def _too_much_sag(bound: BoundUnderPremise) -> InputError | None:
-    """Say that the curvature leaves no offset where the bounds at the tests themselves would."""
-    if bound.premise != "smooth" or bound.lower.min() <= 0:
+    if options.curve == "smooth" and options.curvature is None:
+        count = scatter.model.knots_MPa.size
+        if count < FEWEST_FOR_BENDS:
+            raise InputError(
+                f"--curve smooth with {count} pressure drop(s): a curvature is estimated from {FEWEST_FOR_BENDS} or "
+                "more; declare it by --curvature, or record more tests"
+            )
         return None
-    largest = 1e3 * float(bound.curvature.max())
-    return InputError(
-        worded(
-            "with a curvature M of up to {largest:.3g mV/MPa²} the threshold may sag between the tests so far that no "
-            "positive offset is left, or one that varies beyond bounds; record tests between, declare the valve's "
-            "--curvature if it is less, or ask for another --curve",
-            largest=largest,
+    return "smooth" if options.curvature is not None else options.curve
+
+
+def _checked(scatter: Scatter, premise: Premise, curvature: float | None, tested: Tested) -> PremiseCheck:
+    """Return how a premise fits the tests, and the dead zone that it would leave."""
+    way = WAYS[tested.direction] if premise == "monotone" else 0
+    estimated = premise == "smooth" and curvature is None
+    p_value = None if estimated else lack_of_fit(scatter, curve=premise, curvature=curvature, direction=way)
+    try:
+        left = _dead_zone_left(_bound(scatter, None if estimated else premise, curvature, tested), tested)
+    except InputError:
+        left = None
+    return PremiseCheck(premise=premise, lack_of_fit_p=p_value, dead_zone_over_u_max=left)
+
+
+def _bound(scatter: Scatter, asked: Premise | None, curvature: float | None, tested: Tested) -> _Bounded:
+    """Return the bound under a premise, None: what bends from test to test, and the law's offset under it.
+
+    Raises
+    ------
+    InputError
+        If no curve agrees with the tests, or no positive offset is left.
+    """
+    way = WAYS[tested.direction]
+    several = scatter.model.knots_MPa.size > 1
+    curves = find_class(scatter, curve=asked if several else None, curvature=curvature, direction=way)
+    certificate = certify(scatter, curves, confidence=tested.options.confidence)
+    bound = np.maximum(np.floor(certificate.bound * 10**DECIMALS - 1) / 10**DECIMALS, LOWEST_V)
+    offset = running_minimum(bound, way) - ROUNDING
+    if offset.min() <= 0:
+        raise InputError(
+            worded(
+                "the threshold's lower bound is {bound:.3f V}, not above zero: no dead zone can be compensated without "
+                "opening the valve at zero command; check the ramp tests and the meter's zero",
+                bound=bound.min(),
+            )
         )
-    )
-
-
-def _no_premise(vertex: Vertex) -> Worded:
-    """Say that neither a direction nor a curvature is supported, and which test would help."""
-    return worded(
-        "the tests bend so much that the threshold seems lowest between {low:.3g #MPa} and {high:.3g MPa}, "
-        "{depth:.3g mV} below both (p = {p:.2g}): no threshold that runs one way, and no curvature that leaves an "
-        "offset, agrees with them. Record a test at about {at:.2g MPa}, declare the largest --curvature, or, if you "
-        "know that it runs one way there, give --curve monotone",
-        low=vertex.from_MPa, high=vertex.to_MPa, depth=1e3 * vertex.depth_V, p=vertex.p_value, at=vertex.at_MPa,
-    )  # fmt: skip
-
-
-def _fit_offset(bound: BoundUnderPremise, tested: Tested) -> OffsetUnderBound:
-    """Fit the law's offset under a bound."""
-    u_max, dp = tested.options.u_max, tested.dp_MPa
-    if bound.premise == "monotone":
-        _, ceiling = staircase(bound.lower, tested.direction)
-        fit = fit_offset(bound.value, bound.se, ceiling, tested.reference, u_max=u_max, trend=tested.direction)
-        active = tuple(f"offset at test {row + 1}" for row, holds in enumerate(fit.active) if holds)
-        found = OffsetUnderBound(dp_MPa=dp, offset=fit.u_min0 * fit.beta, u_min0=fit.u_min0, active=active)
-    else:
-        found = fit_offset_under(
-            CertifiedBound.of(bound.premise, dp.tolist(), bound.lower.tolist(), bound.curvature.tolist(),
-                              tested.direction),
-            dp, bound.value, tested.reference, trend=tested.direction, u_max=u_max,
-        )  # fmt: skip
-    beta = found.offset / found.u_min0
+    at_dp0 = float(np.interp(tested.dp_MPa[tested.reference], curves.grid_MPa, offset)) if several else offset[0]
+    beta = offset / at_dp0
     if beta.max() > LARGEST_BETA:
         raise InputError(
             f"beta(dP) reaches {beta.max():.2f}, expected at most {LARGEST_BETA}: the threshold at dP0 is less "
             "than half of that at another pressure drop; give the pressure drop with the largest threshold by --dp0"
         )
-    return found
+    return _Bounded(curves=curves, certificate=certificate, bound=bound, offset=offset)
 
 
-def _check(bound: BoundUnderPremise, offset: OffsetUnderBound | None, tested: Tested) -> PremiseCheck:
-    """Return a premise's test, and the largest dead zone on opening that a law without transition would leave.
+def _dead_zone_left(bounded: _Bounded, tested: Tested) -> float:
+    """Return the largest dead zone on opening that a law without transition would leave, over u_max."""
+    opens_V = tested.opens_V
+    if bounded.offset.size > 1:
+        opens_V = np.interp(bounded.curves.grid_MPa, tested.dp_MPa, opens_V)
+    above = (opens_V - bounded.offset) / np.maximum(tested.options.u_max - bounded.offset, np.finfo(float).tiny)
+    return float(np.clip(above.max(), 0.0, 1.0))
 
-    Between the tests too, where the offset may sag and the opening knee is taken as straight: by the tests alone a
-    curvature would look cheaper than it is. Both are linear between their nodes, so one of these has the largest.
-    """
-    left = None
-    if offset is not None:
-        offset_V, opens_V = offset.offset, tested.opens_V
-        if offset.dp_MPa.size > 1:
-            nodes = np.union1d(offset.dp_MPa, tested.dp_MPa)
-            offset_V = np.interp(nodes, offset.dp_MPa, offset_V)
-            opens_V = np.interp(nodes, tested.dp_MPa, opens_V)
-        above = (opens_V - offset_V) / np.maximum(tested.options.u_max - offset_V, np.finfo(float).tiny)
-        left = float(np.clip(above.max(), 0.0, 1.0))
-    return PremiseCheck(premise=bound.premise, lack_of_fit_p=bound.p_value, dead_zone_over_u_max=left)
+
+def _curve(
+    guarded: GuardedThreshold,
+    scatter: Scatter,
+    bounded: _Bounded,
+    curvature: float | None,
+    checks: tuple[PremiseCheck, ...],
+    tested: Tested,
+) -> CertifiedCurve:
+    """Return the curve for valve.json."""
+    grid, kind = bounded.curves.grid_MPa, bounded.curves.kind
+    nodes = tuple(map(float, grid)) if tested.with_dp else ()
+    at_tests = np.interp(tested.dp_MPa, grid, bounded.bound) if tested.with_dp else bounded.bound
+    at_dp0 = bounded.offset[0]
+    if tested.with_dp and grid.size > 1:
+        at_dp0 = np.interp(tested.dp_MPa[tested.reference], grid, bounded.offset)
+    smooth = PREMISE_OF[kind] == "smooth"
+    declared, assumed = assumed_sd(tested.options)
+    return CertifiedCurve(
+        premise=PREMISE_OF[kind],
+        premises=checks,
+        curvature_V_MPa2=float(bounded.curves.density.max()) if smooth else None,
+        curvature_is=("declared" if kind == "smooth" else "estimated") if smooth else None,
+        dp_MPa=tuple(map(float, tested.dp_MPa)) if tested.with_dp else (),
+        u_threshold_V=tuple(map(float, np.maximum(guarded.threshold.value, at_tests))),
+        u_lower_V=tuple(map(float, at_tests)),
+        bound_dp_MPa=nodes,
+        bound_V=tuple(map(float, bounded.bound)),
+        proof=BoundProof.of(
+            scatter, bounded.certificate, sources=guarded.sources, y=guarded.ramps.y,
+            known_sd_V=assumed if declared is None else declared, least_sd_V=guarded.least_sd, curvature=curvature,
+            with_dp=tested.with_dp,
+        ),
+        u_min0_V=float(at_dp0),
+        offset_dp_MPa=nodes,
+        offset_V=tuple(map(float, bounded.offset)),
+        above=_above(scatter, bounded, tested),
+    )  # fmt: skip
+
+
+def _above(scatter: Scatter, bounded: _Bounded, tested: Tested) -> AboveTests | None:
+    """Continue the bound above the last test, up to the first node where it says nothing any more."""
+    if not tested.with_dp or tested.dp_MPa.size < 2:
+        return None
+    above = continue_above(scatter, bounded.certificate, confidence=tested.options.confidence)
+    if above is None:
+        return None
+    lower = np.floor(np.minimum(above.bound, bounded.bound[-1]) * 10**DECIMALS) / 10**DECIMALS
+    lower = np.maximum(lower, LOWEST_V)
+    ends = np.flatnonzero((lower[1:] <= 0) | (above.dp_MPa[1:] > LARGEST_MPa))
+    kept = slice(0, int(ends[0]) + 2 if ends.size else lower.size)
+    nodes = np.minimum(above.dp_MPa[kept], LARGEST_MPa)
+    return AboveTests(
+        certified=above.certified, dp_MPa=tuple(map(float, nodes)), u_lower_V=tuple(map(float, lower[kept]))
+    )
+
+
+def _active(bounded: _Bounded) -> tuple[str, ...]:
+    """Return the stretches of the interval on which the offset lies on the bound, in words."""
+    on_bound = bounded.bound - bounded.offset < 2 * ROUNDING
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], on_bound.astype(int), [0]])))
+    found = []
+    for first, last in zip(edges[::2], edges[1::2] - 1, strict=True):
+        low, high = (f"{bounded.curves.grid_MPa[place]:.3f}" for place in (first, last))
+        found.append(f"offset at {low} MPa" if low == high else f"offset from {low} to {high} MPa")
+    return tuple(found)

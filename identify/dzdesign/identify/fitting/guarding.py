@@ -1,49 +1,21 @@
 """The thresholds that a certificate may guard, of both branches and their mean, with their bounds at the tests."""
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
-from dzdesign.identify.fitting.bounds import (
-    excess_departure,
-    lower_bounds,
-)
-from dzdesign.identify.fitting.constrained_fits import ACTIVE, KneeFit, fit_knees
+from dzdesign.identify.fitting.bounds import lower_bounds
 from dzdesign.identify.fitting.soft_edges import EdgeShapes, find_softness, fit_edge_shapes
 from dzdesign.identify.fitting.threshold import Threshold
 from dzdesign.identify.fitting.zero_flow import with_zero_flow
 from dzdesign.identify.knees.described_tests import DescribedTests
+from dzdesign.identify.knees.knee_table import Knees
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.valve.staircase import Direction
 
 #: Standard errors by which the tail's zero must lie below the knee, in one test or in all together, to be taken for a
 #: soft edge. At 3 one sharp valve in a hundred was, and beta(5 MPa) scattered by 7e-4 instead of 2.6e-4; which soft
 #: edges are found hardly changes (a width of 0.6 V always is, with any meter).
 SOFT_SIGNIFICANCE = 3.5
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OrderedKnees:
-    """Knees of which those of one branch run the way of the trend."""
-
-    #: That branch: 0 rising, 1 falling.
-    column: int
-    #: The fit under the trend; the free one where there is none.
-    fit: KneeFit
-    #: How far each of its knees departs from that direction, V, beyond its own error: data that contradict the
-    #: certificate's one premise have to pay for it.
-    departure: np.ndarray
-
-    @property
-    def knee(self) -> np.ndarray:
-        """Knees of that branch, V."""
-        return self.fit.knee[:, self.column]
-
-    @property
-    def knee_se(self) -> np.ndarray:
-        """Their standard errors, V."""
-        return self.fit.knee_se[:, self.column]
 
 
 def systematic_change(group: DescribedTests, column: int, options: IdentifyOptions) -> float:
@@ -57,37 +29,6 @@ def systematic_change(group: DescribedTests, column: int, options: IdentifyOptio
     return options.flat_below * options.u_max + by_lag + float(np.ptp(shifts))
 
 
-def order_knees(
-    group: DescribedTests, free: KneeFit, direction: Direction, column: int, options: IdentifyOptions
-) -> OrderedKnees:
-    """Fit the knees of one branch again under the trend's direction, and see how far they depart from it.
-
-    From the fit without a direction, of which the other branch is: the likelihood is a sum over branches, so it is not
-    moved.
-
-    Raises
-    ------
-    InputError
-        If the fit does not converge.
-    """
-    if len(group.tests) < 2:
-        return OrderedKnees(column=column, fit=free, departure=np.zeros(1))
-    knee = free.knee[:, column]
-    knee_se = np.sqrt(np.diag(group.between(column).covariance_of_mean(free.knee_se[:, column])))
-    budget = systematic_change(group, column, options)
-    if direction == "flat":
-        departure = excess_departure(np.abs(knee - knee.mean()), knee_se, budget)
-        return OrderedKnees(column=column, fit=free, departure=departure)
-    if np.all(np.diff(knee) * (1 if direction == "increasing" else -1) > ACTIVE * options.u_max):
-        # They run that way by themselves: no constraint would be active, and the fit is the same.
-        return OrderedKnees(column=column, fit=free, departure=np.zeros(knee.size))
-    of_branch = [(None, falling) if column else (rising, None) for rising, falling in (x.shapes for x in group.tests)]
-    fit = fit_knees(of_branch, floor=group.floor, u_max=options.u_max, trend=direction, ordered=column)
-    fit = fit.with_other_branch(free, 1 - column)
-    departure = excess_departure(np.abs(knee - fit.knee[:, column]), knee_se, budget)
-    return OrderedKnees(column=column, fit=fit, departure=departure)
-
-
 def edges_of_branch(group: DescribedTests, column: int, options: IdentifyOptions) -> EdgeShapes:
     """Fit the shapes of the edge to the tests' rising (0) or falling (1) branch."""
     shapes = [item.branch(column) for item in group.tests]
@@ -95,19 +36,19 @@ def edges_of_branch(group: DescribedTests, column: int, options: IdentifyOptions
 
 
 def bound_threshold(
-    group: DescribedTests, knees: OrderedKnees, edges: EdgeShapes, options: IdentifyOptions
+    group: DescribedTests, knees: Knees, column: int, edges: EdgeShapes, options: IdentifyOptions
 ) -> Threshold:
     """Bound the knee, or below it what a soft edge still passes: the tail's zero, if that lies below by more than its
     error, and where the flow falls to the noise level; or where it comes to the flow that is allowed at zero. `edges`
     are those of the same branch."""
-    shapes = [item.branch(knees.column) for item in group.tests]
-    knee, knee_se = knees.knee, knees.knee_se
+    shapes = [item.branch(column) for item in group.tests]
+    knee, knee_se = knees.knee[:, column], knees.knee_se[:, column]
     zero = np.array([shape.tail.zero for shape in shapes])
     zero_se = np.array([shape.tail.zero_se for shape in shapes])
-    lag_budget = group.lag.shift_at(group.rates(knees.column), rising=knees.column == 0)
+    lag_budget = group.lag.shift_at(group.rates(column), rising=column == 0)
     # Steps of equal height stop the spool anywhere within the root of three standard deviations of its mean course.
     stops = math.sqrt(3) * np.array([shape.ripple for shape in shapes])
-    shared = knees.departure.max() + lag_budget + stops
+    shared = lag_budget + stops
     # What was subtracted as the meter's zero has an error of its own, which moves all readings of a test together.
     inflations = [shape.variance_inflation for shape in shapes]
     subtracted = np.array([se * math.sqrt(factor) for se, factor in zip(group.zero_se, inflations, strict=True)])
@@ -123,7 +64,7 @@ def bound_threshold(
     # One edge has passed the flow of all tests, so together they show a softness that none shows alone.
     together = np.sum(gap / error**2) > SOFT_SIGNIFICANCE * math.sqrt(np.sum(error**-2))
     soft = (gap > SOFT_SIGNIFICANCE * error) | (together & (gap > 0))
-    between = group.between(knees.column)
+    between = group.between(column)
     knee_bound = lower_bounds(knee, knee_se, between, options.confidence, knee_budget)
     zero_bound = lower_bounds(zero, zero_se, between, options.confidence, zero_budget)
     # What averages show below the knee at one pressure drop is one edge's, which all tests have.
@@ -140,7 +81,7 @@ def bound_threshold(
         np.minimum(bound, knee - softness.likely - margin),
         lag_budget,
     )
-    return with_zero_flow(group, knees.column, found, shared, options)
+    return with_zero_flow(group, column, found, shared, options)
 
 
 def mean_threshold(group: DescribedTests, opening: Threshold, closing: Threshold) -> Threshold:

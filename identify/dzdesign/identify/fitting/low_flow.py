@@ -16,8 +16,7 @@ import numpy as np
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import Worded, worded
 from dzdesign.identify.constants import L_MIN, MPA
-from dzdesign.identify.fitting.guarded_thresholds import GuardedThreshold, Guarding
-from dzdesign.identify.fitting.threshold import Threshold
+from dzdesign.identify.fitting.guarded_thresholds import DECIMALS, GuardedThreshold, Guarding
 from dzdesign.identify.fitting.zero_flow import allowed_at_zero
 from dzdesign.identify.knees.branch_shape import BranchShape
 from dzdesign.identify.knees.described_tests import DescribedTests
@@ -141,7 +140,7 @@ def _refuse_another_valve(row: LowFlow, dp: np.ndarray, guarding: Guarding, grou
 
 def _apart(threshold: GuardedThreshold, test: int) -> float:
     """Return how far a threshold stands above its bound at a test, V: by so much the next closing may differ."""
-    return max(float((each.value - each.bound)[test]) for each in (threshold.free, threshold.ordered))
+    return float((threshold.threshold.value - threshold.threshold.bound)[test])
 
 
 def _seen(shape: BranchShape, u: float, leak: float) -> float:
@@ -166,7 +165,7 @@ def _lowered(
     """
 
     def threshold_at(dp_MPa: float) -> float:
-        return max(_continued(dp_MPa, dp, each.value) for each in (guarded.free, guarded.ordered))
+        return _continued(dp_MPa, dp, guarded.threshold.value)
 
     threshold, least = threshold_at(row.dp_MPa), float(np.interp(row.dp_MPa, dp, none))
     if not row.shows_flow_on(branch) or row.u_V > threshold or row.at_least_L_min <= least:
@@ -194,10 +193,11 @@ def _open_below(row: LowFlow, branch: Branch, threshold: float, least: float) ->
 
 
 def _shifted(guarded: GuardedThreshold, depth: float) -> GuardedThreshold:
-    def lower(each: Threshold) -> Threshold:
-        return replace(each, value=each.value - depth, bound=each.bound - depth)
-
-    return replace(guarded, free=lower(guarded.free), ordered=lower(guarded.ordered)) if depth else guarded
+    if not depth:
+        return guarded
+    threshold, ramps = guarded.threshold, guarded.ramps
+    lower = replace(threshold, value=threshold.value - depth, bound=threshold.bound - depth)
+    return replace(guarded, threshold=lower, ramps=replace(ramps, y=np.round(ramps.y - depth, DECIMALS)))
 
 
 def unseen_of_curve(rows: Sequence[LowFlow], guard: Guard, curve: CertifiedCurve, level_L_min: float) -> Unseen:

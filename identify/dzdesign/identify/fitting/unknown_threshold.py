@@ -15,7 +15,7 @@ def unknown_threshold(group: DescribedTests, guarding: Guarding) -> Worded | Non
     The first flows of a soft edge, few above a meter's floor, may leave their zero open by volts. Then neither the
     meter's zero nor the valve is at fault, and the knee is known well all the same.
     """
-    threshold = next(iter(guarding.thresholds.values())).ordered
+    threshold = next(iter(guarding.thresholds.values())).threshold
     worst = int(threshold.bound.argmin())
     value, se, bound = (float(each[worst]) for each in (threshold.value, threshold.se, threshold.bound))
     if bound > 0 or value <= 0 or se < group.between(guarding.column).sd:

@@ -10,8 +10,7 @@ pressure drop can be told apart, and the residuals, pooled over all pressure dro
 brought to the state in the middle of the series, so that those pooled to one test lie on one line; `fitting.bounds`
 allows for the next closing at any state that the series has seen.
 
-The premise is a normal scatter, as large at all pressure drops and independent from ramp to ramp. Where the repeats
-refuse one variance for all, that of the pressure drop with the largest scatter counts everywhere.
+The premise is a normal scatter, as large at all pressure drops and independent from ramp to ramp.
 """
 
 import math
@@ -75,12 +74,12 @@ class BetweenRamps:
     drift: Drift | None
     #: Why there is no drift in the model; empty where there is.
     no_drift: NoDrift
+    #: What the ramps tell, each by itself.
+    known: "RampKnees"
     #: By how much each ramp of each test stands off the middle of the series and of its test's ramps, V.
     shifts: tuple[np.ndarray, ...]
-    #: What the repeats say against the premises, and whether `sd`, `degrees` and `noise` are those of the largest
-    #: scatter for that reason.
+    #: What the repeats say against the premises.
     checks: ScatterChecks
-    of_largest: bool = False
 
     def covariance_of_mean(self, noise_se: np.ndarray) -> np.ndarray:
         """Return the covariance of the thresholds in the middle of the series, V² (T, T).
@@ -102,40 +101,6 @@ class BetweenRamps:
         variance: np.ndarray = self.sd**2 * (1 + lever) + self._noise(noise_se)
         return variance
 
-    @property
-    def measured(self) -> bool:
-        """Whether the scatter was measured on repeats."""
-        return self.origin == "repeats"
-
-    def covariance_of_next(self, noise_se: np.ndarray, weights: np.ndarray, state: float | None) -> np.ndarray:
-        """Return the covariance, V² (N, N), of the next closing (or opening) less N weighted sums of the thresholds.
-
-        As `variance_of_next` has it, for `weights` (N, T); one next closing is common to all sums. A `state` of None
-        counts the noise alone.
-        """
-        if state is None:
-            alone: np.ndarray = (weights * noise_se**2) @ weights.T
-            return alone
-        rows = weights if self.drift is None else np.column_stack([weights, np.full(len(weights), state)])
-        known = self.covariance[: rows.shape[1], : rows.shape[1]]
-        noise = (weights * self._noise(noise_se)) @ weights.T
-        found: np.ndarray = self.sd**2 * (rows @ known @ rows.T + 1.0) + noise
-        return found
-
-    def degrees_of_next(
-        self, noise_se: np.ndarray, weights: np.ndarray, of_noise: float, state: float | None
-    ) -> float:
-        """Return the least effective degrees of freedom of these covariances' diagonal."""
-        if self.measured and state is not None:
-            return self.degrees
-        noise = weights**2 * noise_se**2
-        every = noise.sum(axis=1)
-        if state is not None:
-            every = np.einsum("ni,ij,nj->n", weights, self.covariance_of_mean(noise_se), weights)
-        squares = np.sqrt(np.sum(noise**2, axis=1))
-        share = squares / np.maximum(every, np.finfo(float).tiny)
-        return float(np.min(of_noise / np.maximum(share, SMALLEST_SHARE) ** 2))
-
     def degrees_of_freedom(self, noise_se: np.ndarray, of_noise: float) -> np.ndarray:
         """Return the effective degrees of freedom of these variances (T,) (Welch and Satterthwaite)."""
         if self.origin == "repeats":
@@ -144,14 +109,6 @@ class BetweenRamps:
         share = noise_se**2 / np.maximum(every, np.finfo(float).tiny)
         degrees: np.ndarray = of_noise / np.maximum(share, SMALLEST_SHARE) ** 2
         return degrees
-
-    def tail(self, confidence: float, tests: int) -> float:
-        """Return the probability with which the bound of each test holds, where those of all have that confidence.
-
-        Bonferroni; but the largest of several scatters counts for all tests, and is large enough for all of them where
-        it is for one that scatters alone: with more that do, the largest of theirs is less often found too small.
-        """
-        return confidence if self.of_largest else 1 - (1 - confidence) / tests
 
     def _noise(self, noise_se: np.ndarray) -> np.ndarray:
         """Return what the noise adds, V²: all of it, or what exceeds the average ramp's where `sd` has that in it."""
@@ -176,22 +133,6 @@ class RampKnees:
     least: np.ndarray | None = None
     #: What the recording's columns of two values say of each; nothing where there are none.
     switched: Sequence[Mapping[str, str]] = ()
-
-
-def compare_ramps(known: RampKnees, counts: Sequence[int], *, declared: float | None, u_max: float) -> BetweenRamps:
-    """Compare the ramps of one branch, as `pool_scatter`; the largest scatter counts where the repeats refuse one.
-
-    Of two groups of ramps half their distance is the least scatter.
-    """
-    pooled = pool_scatter(known, counts, declared=declared, u_max=u_max)
-    if pooled.checks.groups:  # the bounds are those of the lower group too, however few of the ramps are in it
-        pooled = replace(pooled, sd=max(pooled.sd, pooled.checks.groups.apart / 2))
-    largest, drift = pooled.checks.largest, pooled.drift
-    if largest is None or pooled.origin != "repeats":
-        return pooled
-    if drift:
-        drift = replace(drift, change_se=drift.change_se * largest.sd / pooled.sd)
-    return replace(pooled, sd=largest.sd, degrees=largest.degrees, noise=largest.noise, drift=drift, of_largest=True)
 
 
 def pool_scatter(known: RampKnees, counts: Sequence[int], *, declared: float | None, u_max: float) -> BetweenRamps:
@@ -221,7 +162,7 @@ def pool_scatter(known: RampKnees, counts: Sequence[int], *, declared: float | N
     origin = _origin(squares, noise, degrees, declared, u_max)
     measured = origin == "repeats"
     least = known.noise + (FINEST * u_max) ** 2
-    checks = check_scatter(residual, design, known.test, known.number, least, known.when)
+    checks = check_scatter(residual, design, least, known.when)
     checks = replace(
         checks,
         alike=find_alike_repeats(residual, design, known.test, known.least),
@@ -252,6 +193,7 @@ def pool_scatter(known: RampKnees, counts: Sequence[int], *, declared: float | N
         covariance=covariance,
         drift=drift,
         no_drift=no_drift,
+        known=known,
         shifts=shifts,
         checks=checks,
     )

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 from dzdesign.identify.knees.dead_zone import DeadZone
 from dzdesign.identify.knees.gated_line import GatedLine, PreparedBranch
-from dzdesign.identify.ramps.branches import Bins
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,9 +27,7 @@ class BranchShape:
     #: The samples that all this was found from, and the straight line through those in the knee window.
     prepared: PreparedBranch
     line: GatedLine
-    #: Sufficient statistics of the knee window, outliers left out.
-    bins: Bins
-    #: Of `prepared` and `line`: where the joint fit starts from, and what it takes of the noise.
+    #: Of `prepared` and `line`.
     y_max: float
     slope: float
     knee: float
@@ -39,7 +36,6 @@ class BranchShape:
     sigma: float
     variance_inflation: float
     outliers: int
-    dropped: float
     #: Standard deviation of a reading while the valve is shut, m³/s.
     noise: float
     #: Flow from which a single reading counts as flow: the meter's floor, its noise or `USEFUL_FLOW`, whichever is

@@ -14,7 +14,6 @@ from dzdesign.identify.knees.linear_region import StraightParts, find_straight_p
 from dzdesign.identify.knees.noise import measure_roughness, robust_sigma, variance_inflation
 from dzdesign.identify.knees.profile import crossing, hole_within
 from dzdesign.identify.knees.spool_ripple import spool_ripples
-from dzdesign.identify.ramps.branches import bin_branch
 from dzdesign.identify.ramps.medians import median
 
 #: Standard deviations of a shut reading above which the mean of a bin is flow.
@@ -54,7 +53,7 @@ def _describe(
     parts: StraightParts, index: int, read: PreparedBranch, ripple: float, longest_lag: float, u_max: float
 ) -> BranchShape:
     line, level, noise = parts.lines[index], parts.levels[index], parts.noises[index]
-    branch, kept = read.branch, line.kept
+    branch = read.branch
     dead_zone = look_into_dead_zone(
         read,
         line,
@@ -73,7 +72,6 @@ def _describe(
     return BranchShape(
         prepared=read,
         line=line,
-        bins=bin_branch(branch.u[kept], read.y[kept], line.censored[kept], u_max),
         y_max=read.y_max,
         slope=line.slope,
         knee=line.knee,
@@ -81,7 +79,6 @@ def _describe(
         sigma=line.sigma,
         variance_inflation=line.variance_inflation,
         outliers=line.outliers,
-        dropped=line.dropped,
         noise=noise,
         level=level,
         dead_zone=dead_zone,

@@ -89,8 +89,6 @@ class GatedLine:
     roughness: Roughness
     #: Samples gated out.
     outliers: int
-    #: Share of the samples that read below the floor where no flow below it is credible: drop-outs.
-    dropped: float
 
     @property
     def knee_se(self) -> float:

@@ -78,7 +78,6 @@ def lay_line(read: PreparedBranch, window: tuple[float, float]) -> GatedLine:
         censored=_among(inside, censored),
         roughness=measure_roughness(u_seen, residual),
         outliers=int((~kept).sum()),
-        dropped=_share_of_drop_outs(censored, slope * (u - knee) >= floor + GATE * sigma),
     )
 
 
@@ -115,10 +114,6 @@ def _runs_of_drop_outs(censored: np.ndarray, above: np.ndarray, residual: np.nda
     chance = np.diff(last, prepend=0.0) * (news + (1 - news) / length)
     lost[censored] = np.repeat(chance < UNLIKELY, length)
     return lost
-
-
-def _share_of_drop_outs(censored: np.ndarray, plain: np.ndarray) -> float:
-    return float(censored[plain].mean()) if plain.any() else 0.0
 
 
 def _among(inside: np.ndarray, chosen: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ import numpy as np
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import worded
 from dzdesign.identify.constants import FULL_SWEEP, L_MIN, SMALLEST_DP
-from dzdesign.identify.knees.between_ramps import BetweenRamps, compare_ramps, knees_of_ramps
+from dzdesign.identify.knees.between_ramps import BetweenRamps, knees_of_ramps, pool_scatter
 from dzdesign.identify.knees.branch_shape import BranchShape
 from dzdesign.identify.knees.characteristic import describe_branches
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
@@ -205,7 +205,7 @@ def _between_ramps(described: list[DescribedTest], column: int, options: Identif
         return None
     declared = None if options.repeatability is None else options.repeatability * options.u_max
     known = knees_of_ramps(shapes, [item.when for item in described], [item.switched for item in described])
-    return compare_ramps(known, [len(item.when) for item in described], declared=declared, u_max=options.u_max)
+    return pool_scatter(known, [len(item.when) for item in described], declared=declared, u_max=options.u_max)
 
 
 def _with_ramps_together(item: PooledTest, row: int, between: Sequence[BetweenRamps | None]) -> PooledTest:

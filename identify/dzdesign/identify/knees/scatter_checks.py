@@ -1,7 +1,7 @@
-"""Whether the scatter from ramp to ramp is what the bounds take it for: normal, as large at all pressures, independent.
+"""Whether the ramps are what the bounds take them for: independent, no copies, of one population.
 
-Each check is exact, or nearly so, for few repeats of a normal scatter, and none of them sees everything: of three ramps
-each, a scatter ten times as large at one of six pressure drops is missed in one series of four.
+Each check is exact, or nearly so, for few repeats of a normal scatter, and none of them sees everything. Whether the
+scatter is equal everywhere, and which ramps lie off, `fit.scatter` tells.
 """
 
 import math
@@ -20,31 +20,6 @@ FEWEST_IN_A_ROW = 4
 PARTED, FEWEST_TO_PART = 1e-3, 3
 #: Degrees of freedom below the one, and squares over those of the noise below the other, are rounding.
 NO_DEGREES, NOTHING = 1e-6, 1e-6
-
-
-@dataclass(frozen=True, slots=True)
-class LargestScatter:
-    """Scatter at the one pressure drop where it is larger than at the others, by Cochran's test."""
-
-    #: Which test, from 0.
-    test: int
-    #: Standard deviation there, V, its degrees of freedom, and the variance in it that is the noise of one ramp, V².
-    sd: float
-    degrees: float
-    noise: float
-    #: Standard deviation at the other pressure drops, V.
-    of_others: float
-
-
-@dataclass(frozen=True, slots=True)
-class OutlyingRamp:
-    """A ramp that lies further from where the others put it than their scatter allows."""
-
-    #: Test and number in it; of two ramps that differ, and have no third beside them, each may be the one.
-    ramps: tuple[tuple[int, int], ...]
-    #: Distance, V, and how many standard deviations of such a distance.
-    distance: float
-    ratio: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,8 +51,6 @@ class TwoGroups:
 class ScatterChecks:
     """What the ramps of one branch say against the premises; None where they don't."""
 
-    largest: LargestScatter | None
-    outlying: OutlyingRamp | None
     #: Correlation of neighbouring ramps.
     serial: float | None
     alike: AlikeRepeats | None = None
@@ -87,8 +60,6 @@ class ScatterChecks:
 def check_scatter(
     residual: np.ndarray,
     design: np.ndarray,
-    test: np.ndarray,
-    number: np.ndarray,
     noise: np.ndarray,
     when: np.ndarray,
 ) -> ScatterChecks:
@@ -98,22 +69,15 @@ def check_scatter(
     ----------
     residual, design : array
         Of the model.
-    test, number : (R,) array
-        Of each ramp, which test it is of and which ramp of that.
     noise : (R,) array
         Variance that the noise gives each knee, V².
     when : (R,) array
         When each was recorded, s; NaN where that is not known.
     """
     if residual.size <= design.shape[1] or residual @ residual <= NOTHING * noise.sum():
-        return ScatterChecks(largest=None, outlying=None, serial=None)
+        return ScatterChecks(serial=None)
     basis = np.linalg.qr(design)[0]
-    free = 1 - np.sum(basis**2, axis=1)
-    return ScatterChecks(
-        largest=_find_largest_scatter(residual, free, test, noise),
-        outlying=_find_outlying_ramp(residual, free, test, number),
-        serial=_serial_correlation(residual, basis, when) if np.isfinite(when).all() else None,
-    )
+    return ScatterChecks(serial=_serial_correlation(residual, basis, when) if np.isfinite(when).all() else None)
 
 
 def find_alike_repeats(
@@ -223,59 +187,6 @@ def _parted_best(knee: np.ndarray, test: np.ndarray, number: np.ndarray, noise: 
     _, _, low, high = parted[int(np.argmax(gaps))]
     ends = [(int(test[part[0]]), int(number[part[0]])) for part in (low, high)]
     return TwoGroups(float(gaps[wide].mean()), (ends[0], ends[1]))
-
-
-def _find_largest_scatter(
-    residual: np.ndarray, free: np.ndarray, test: np.ndarray, noise: np.ndarray
-) -> LargestScatter | None:
-    """Return where the ramps scatter more than elsewhere, or None if they may well scatter alike (Cochran's test).
-
-    Each residual has a share `free` (R,) of its ramp's variance. The noise of each ramp is known, so that alike means:
-    one variance from ramp to ramp beside it, and that may be none.
-    """
-    from scipy.special import betainc
-
-    degrees, squares = (np.bincount(test, weights=each) for each in (free, residual**2))
-    groups = np.flatnonzero(degrees > NO_DEGREES)
-    if groups.size < 2:
-        return None
-    total = float(degrees.sum())
-    noises = np.bincount(test, weights=noise) / np.maximum(np.bincount(test), 1)
-    found = []
-    for of_valve in (0.0, max(float(squares.sum()) / total - float(noise.mean()), 0.0)):
-        ratio = (squares / np.maximum(of_valve + noises, np.finfo(float).tiny))[groups]
-        share = ratio / max(float(ratio.sum()), np.finfo(float).tiny)
-        # The share of one of several independent sums of squares has a beta distribution; Bonferroni over them.
-        chance = groups.size * (1 - betainc(degrees[groups] / 2, (total - degrees[groups]) / 2, share))
-        place = int(np.argmin(chance))
-        # Less than the noise, as of copies, says nothing.
-        found.append((float(chance[place]) if ratio[place] > degrees[groups[place]] else 1.0, int(groups[place])))
-    chance_of_all, at = max(found)
-    if chance_of_all > REFUSED:
-        return None
-    of_others = math.sqrt((squares.sum() - squares[at]) / (total - degrees[at]))
-    return LargestScatter(at, math.sqrt(squares[at] / degrees[at]), float(degrees[at]), float(noises[at]), of_others)
-
-
-def _find_outlying_ramp(
-    residual: np.ndarray, free: np.ndarray, test: np.ndarray, number: np.ndarray
-) -> OutlyingRamp | None:
-    """Return the ramp that lies furthest from where the others put it, if that is no chance (Student, Bonferroni)."""
-    from scipy.special import stdtr
-
-    degrees = round(float(free.sum())) - 1
-    known = free > NO_DEGREES
-    if degrees < 1 or not known.any():
-        return None
-    of_ramp = np.where(known, residual**2 / np.where(known, free, 1.0), 0.0)
-    of_others = np.maximum(float(residual @ residual) - of_ramp, np.finfo(float).tiny) / degrees
-    ratio = np.sqrt(of_ramp / of_others)
-    if 2 * known.sum() * stdtr(degrees, -ratio.max()) > REFUSED:
-        return None
-    rows = np.flatnonzero(ratio > (1 - 1e-6) * ratio.max())
-    distance = residual[rows[0]] / free[rows[0]]
-    ramps = tuple((int(test[row]), int(number[row])) for row in rows)
-    return OutlyingRamp(ramps, float(distance), float(ratio.max()))
 
 
 def _serial_correlation(residual: np.ndarray, basis: np.ndarray, when: np.ndarray) -> float | None:

@@ -53,7 +53,6 @@ def line_through_levels(read: PreparedBranch, window: tuple[float, float]) -> Ga
         censored=censored,
         roughness=Roughness(0, 0.0, 0.0),
         outliers=0,
-        dropped=0.0,
     )
 
 

@@ -1,6 +1,6 @@
 """Curves over the pressure drop that both `identify --plots` and the report show: thresholds and beta, drawn once.
 
-What is certified between two tests follows from the premise: a staircase, a line, or a chord less its sag.
+What is certified is straight between the nodes of the bound.
 """
 
 from typing import TYPE_CHECKING
@@ -18,10 +18,8 @@ if TYPE_CHECKING:
 #: Of a branch: key in valve.json, name, marker, dash, hue.
 BRANCHES = (("rising", "opening", "^", "-", "blue"), ("falling", "closing", "v", "--", "vermilion"))
 
-#: What is certified between the tests, by the premise.
-BOUND_NAMES = {"line": "certified line", "smooth": "certified bound", "monotone": "certified staircase"}
-#: Pressure drops at which a bound is drawn.
-BOUND_POINTS = 201
+#: What is certified of the threshold.
+BOUND_NAME = "certified bound"
 
 
 def draw_thresholds(axes: "Axes", side: SideModel, curve: CertifiedCurve, units: RecordedUnits) -> None:
@@ -40,7 +38,7 @@ def draw_thresholds(axes: "Axes", side: SideModel, curve: CertifiedCurve, units:
                               zorder=4)  # fmt: skip
     axes.plot(dp, lower, "_", ms=13, mew=2, color=HUES["ink"], label="lower bound, at the test", zorder=5)
     if len(dp) > 1:
-        draw_bound(axes, side, curve, units, BOUND_NAMES[curve.premise])
+        draw_bound(axes, curve, units, BOUND_NAME)
     nodes = units.convert(np.array(curve.offset_dp_MPa), "MPa") if curve.offset_dp_MPa else dp
     axes.plot(nodes, offset, "D-.", ms=3, lw=1.3, color=HUES["purple"], label="largest certified offset",
               zorder=6)  # fmt: skip
@@ -54,21 +52,13 @@ def draw_thresholds(axes: "Axes", side: SideModel, curve: CertifiedCurve, units:
 
 
 def draw_bound(
-    axes: "Axes", side: SideModel, curve: CertifiedCurve, units: RecordedUnits, label: str, over_V: float | None = None
+    axes: "Axes", curve: CertifiedCurve, units: RecordedUnits, label: str, over_V: float | None = None
 ) -> None:
-    """Draw what is certified of a threshold on the whole interval: in the units of the recordings, or `over_V`."""
-
-    def shown(volts: np.ndarray) -> np.ndarray:
-        return units.convert(volts, "V") if over_V is None else volts / over_V
-
-    bound = curve.bound(side.trend or "flat")
-    dp = np.array([float(end) for end in (bound.pieces[0].from_MPa, *(piece.to_MPa for piece in bound.pieces))])
-    if curve.premise == "monotone":
-        steps = shown(np.array([float(piece.low_V) for piece in bound.pieces]))
-        axes.stairs(steps, units.convert(dp, "MPa"), baseline=None, color=HUES["green"], lw=2, label=label)
-        return
-    fine = np.unique(np.concatenate([dp, np.linspace(dp[0], dp[-1], BOUND_POINTS)]))
-    axes.plot(units.convert(fine, "MPa"), shown(bound.in_doubles(fine)), "-", color=HUES["green"], lw=2, label=label)
+    """Draw what is certified of a threshold, in the units of the recordings or `over_V`."""
+    bound = np.array(curve.bound_V)
+    shown = units.convert(bound, "V") if over_V is None else bound / over_V
+    line = "_" if curve.premise == "none" else "-"
+    axes.plot(units.convert(np.array(curve.bound_dp_MPa), "MPa"), shown, line, color=HUES["green"], lw=2, label=label)
 
 
 def draw_beta(axes: "Axes", side: SideModel, curve: CertifiedCurve, units: RecordedUnits) -> None:
@@ -80,7 +70,7 @@ def draw_beta(axes: "Axes", side: SideModel, curve: CertifiedCurve, units: Recor
             dp = units.convert(np.array(found.dp_MPa), "MPa")
             axes.errorbar(dp, found.beta, yerr=[2 * se for se in found.beta_se], fmt=marker + dash, ms=5,
                           color=HUES[hue], capsize=3, lw=1.2, label=f"β(dP) {word} ± 2 s.e.")  # fmt: skip
-    draw_bound(axes, side, curve, units, f"{BOUND_NAMES[curve.premise]} / u_min0", u_min0)
+    draw_bound(axes, curve, units, f"{BOUND_NAME} / u_min0", u_min0)
     nodes = units.convert(np.array(curve.offset_dp_MPa), "MPa")
     axes.plot(nodes, np.array(curve.offset_V) / u_min0, "D-.", color=HUES["purple"], ms=3, lw=1.4,
               label="largest certified offset / u_min0")  # fmt: skip

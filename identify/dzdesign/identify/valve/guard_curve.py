@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from itertools import pairwise
 from typing import Annotated, Literal, get_args
 
@@ -13,15 +12,8 @@ from dzdesign.core.artefact_types import RuleError, quantity
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.identify.constants import REFUSED, Premise
 from dzdesign.identify.valve.above_tests import AboveTests
-from dzdesign.identify.valve.bound_errors import BoundErrors
+from dzdesign.identify.valve.bound_proof import BoundProof
 from dzdesign.identify.valve.certified_bound import CertifiedBound, largest_excess
-from dzdesign.identify.valve.estimated_curvature import (
-    END_FACTOR_OF_THREE,
-    FEWEST_FOR_CURVATURE,
-    bends_of,
-    curvature_above,
-    estimated_curvature,
-)
 from dzdesign.identify.valve.quantity_types import (
     PressureDrop,
     Probability,
@@ -35,10 +27,12 @@ from dzdesign.identify.valve.staircase import Direction
 Guard = Literal["closing", "mean", "opening"]
 #: Thresholds that a certificate may protect, from the safest on.
 GUARDS: tuple[Guard, ...] = get_args(Guard)
+#: What a bound rests on between the tests; `none` where nothing is known there.
+CurvePremise = Literal["line", "smooth", "monotone", "none"]
 #: Numbers of the file are right to seven decimals; a comparison of two allows ten times that.
 ROUNDING_V = 1e-6
-#: What a number of the file may be off by, with double precision's error.
-ROUNDING = 1e-7
+#: Pressure drops closer than this are one, MPa: the file has seven decimals.
+NEAR_MPa = 1e-6
 #: Where a single test stands whose pressure drop is unknown, MPa: nothing depends on it.
 ANYWHERE = (1.0,)
 
@@ -50,18 +44,16 @@ class PremiseCheck:
     premise: Annotated[
         Premise,
         Meta(
-            description="Premise. line: the threshold is a straight line over the pressure drop. smooth: its second "
-            "divided difference, kinks included, is at most M. monotone: it only rises or only falls "
-            "between neighbouring tests."
+            description="Premise. line: the threshold is a straight line over the pressure drop. smooth: it has at "
+            "most one kink, or a smooth bend, between two tests, no stronger than the tests show; or its second "
+            "divided difference is at most a declared M. monotone: it only rises or only falls."
         ),
     ]
     lack_of_fit_p: Annotated[
         Probability | None,
         Meta(
             description="Probability of tests that contradict the premise at least as much as these if it were true, "
-            "given noise and scatter. The premise is rejected below 0.01. For monotone it is the smaller of "
-            "two: that of the steps, and that of a minimum between two tests. Null: the tests can't "
-            "contradict the premise."
+            "given noise and scatter. The premise is rejected below 0.01. Null: the tests can't contradict the premise."
         ),
     ]
     dead_zone_over_u_max: Annotated[
@@ -81,17 +73,17 @@ class CertifiedCurve:
     Those of two curves are not meant to hold together: a certificate protects one threshold.
     """
 
-    premise: Annotated[Premise, Meta(description="Premise of the bound between the tests.")]
+    premise: Annotated[
+        CurvePremise,
+        Meta(description="Premise of the bound between the tests; none: nothing is certified between two tests."),
+    ]
     premises: Annotated[
         tuple[PremiseCheck, ...],
         Meta(description="Premises that these tests allow, with the dead zone that each would leave."),
     ]
     curvature_V_MPa2: Annotated[
-        tuple[SecondDifference, ...],
-        quantity(
-            "V/MPa2",
-            "Bound M of the curvature in each interval between neighbouring tests; 0 for line, empty for monotone.",
-        ),
+        SecondDifference | None,
+        quantity("V/MPa2", "Largest curvature M that a smooth curve may have; null for another premise."),
     ]
     curvature_is: Annotated[
         Literal["declared", "estimated"] | None,
@@ -100,16 +92,20 @@ class CertifiedCurve:
     dp_MPa: Annotated[
         tuple[PressureDrop, ...], quantity("MPa", "Tested pressure drops; empty if the pressure drop is unknown.")
     ]
-    u_threshold_V: Annotated[tuple[Voltage, ...], quantity("V", "Threshold at each test, as fitted under the premise.")]
-    u_lower_V: Annotated[
+    u_threshold_V: Annotated[tuple[Voltage, ...], quantity("V", "Guarded threshold at each test.")]
+    u_lower_V: Annotated[tuple[Voltage, ...], quantity("V", "Lower bound of the threshold at each test.")]
+    bound_dp_MPa: Annotated[
+        tuple[PressureDrop, ...], quantity("MPa", "Nodes of the bound; empty if the pressure drop is unknown.")
+    ]
+    bound_V: Annotated[
         tuple[Voltage, ...],
         quantity(
             "V",
-            "Lower bounds of the threshold at the tests. Between two tests the bound is their chord minus "
-            "M/2 (dP - a) (b - dP). For monotone it is the lower of the two.",
+            "Lower bound of the threshold at each node: the largest that no threshold contradicts which the ramps and "
+            "the premise allow. It is linear between the nodes, except for none, which has tests alone.",
         ),
     ]
-    errors: Annotated[BoundErrors, Meta(description="Error components of the lower bounds at the tests.")]
+    proof: Annotated[BoundProof, Meta(description="Ramps, scatter and multipliers from which the bound follows.")]
     u_min0_V: Annotated[Voltage, Meta(description="Largest offset at dP0 that the certificate allows.")]
     offset_dp_MPa: Annotated[
         tuple[PressureDrop, ...], quantity("MPa", "Nodes of the offset; empty if the pressure drop is unknown.")
@@ -120,13 +116,14 @@ class CertifiedCurve:
     ]
     above: Annotated[
         AboveTests | None,
-        Meta(description="Bound above the last test; null for a single test, or if the pressure drop is unknown."),
+        Meta(description="Bound above the last test; null if the premise says nothing there."),
     ]
 
     def __post_init__(self) -> None:
         for name, nodes, values in (
             ("the offset", self.offset_dp_MPa, self.offset_V),
-            ("the bound", self.dp_MPa, self.u_lower_V),
+            ("the bound", self.bound_dp_MPa, self.bound_V),
+            ("the tests", self.dp_MPa, self.u_lower_V),
         ):
             if not _rises(nodes) or len(nodes) not in (len(values), 0) or not values or (not nodes and len(values) > 1):
                 raise RuleError(f"the nodes of {name} must be as many as their pressure drops, which must rise")
@@ -135,63 +132,26 @@ class CertifiedCurve:
                 f"{len(self.u_lower_V)} lower bounds stand beside {len(self.u_threshold_V)} thresholds, expected one "
                 "each"
             )
-        if len(self.errors.noise_se_V) != len(self.u_lower_V):
-            raise RuleError(f"{len(self.errors.noise_se_V)} errors stand beside {len(self.u_lower_V)} bounds")
-        if bool(self.dp_MPa) != bool(self.offset_dp_MPa) or (
-            self.dp_MPa and (self.dp_MPa[0], self.dp_MPa[-1]) != (self.offset_dp_MPa[0], self.offset_dp_MPa[-1])
-        ):
-            raise RuleError("the nodes of the offset must reach from the first tested pressure drop to the last")
-        bends = 0 if self.premise == "monotone" else len(self.u_lower_V) - 1
-        if len(self.curvature_V_MPa2) != bends:
-            raise RuleError(
-                f"the premise is '{self.premise}' and {len(self.curvature_V_MPa2)} values of M stand beside "
-                f"{len(self.u_lower_V)} tests, expected {bends}"
-            )
-        if (self.premise == "smooth") != (self.curvature_is is not None):
-            raise RuleError("where M is from must be said of a smooth curve, and of no other")
+        for nodes in (self.bound_dp_MPa, self.offset_dp_MPa):
+            reach = zip(self.dp_MPa[:1] + self.dp_MPa[-1:], nodes[:1] + nodes[-1:], strict=False)
+            if bool(nodes) == bool(self.dp_MPa) and all(abs(left - right) < NEAR_MPa for left, right in reach):
+                continue
+            raise RuleError("the nodes of bound and offset must reach from the first tested pressure drop to the last")
+        if (self.premise == "smooth") != (self.curvature_is is not None) != (self.curvature_V_MPa2 is None):
+            raise RuleError("M, and where it is from, must be said of a smooth curve, and of no other")
         if any(low > high + ROUNDING_V for low, high in zip(self.u_lower_V, self.u_threshold_V, strict=True)):
             raise RuleError("a lower bound lies above the threshold that it bounds")
-        if (self.above is None) != (len(self.dp_MPa) < 2):
-            raise RuleError("a bound above the tests must stand beside two tests or more, and beside no other")
-        self._check_premise()
+        check = next((each for each in self.premises if each.premise == self.premise), None)
+        if check is not None and check.lack_of_fit_p is not None and check.lack_of_fit_p < REFUSED:
+            raise RuleError(f"the premise is '{self.premise}', which the tests refuse (p = {check.lack_of_fit_p:.2g})")
         if not self.u_min0_V > 0 or min(self.offset_V) <= 0:
             raise RuleError(f"u_min0 is {self.u_min0_V:g} V, expected a positive threshold")
-
-    def _check_premise(self) -> None:
-        """Check that the tests allow the premise, and that M is what follows from them where it was estimated."""
-        check = next((each for each in self.premises if each.premise == self.premise), None)
-        if check is None:
-            raise RuleError(f"the premise is '{self.premise}', expected one of those that the tests allow")
-        # `monotone` pays for steps the wrong way: its bounds are lowered.
-        if self.premise != "monotone" and check.lack_of_fit_p is not None and check.lack_of_fit_p < REFUSED:
-            raise RuleError(f"the premise is '{self.premise}', which the tests refuse (p = {check.lack_of_fit_p:.2g})")
-        stated = np.array(self.curvature_V_MPa2)
-        if self.premise == "line" and stated.any():
-            raise RuleError("a straight threshold has M = 0")
-        if self.curvature_is == "declared" and len(set(self.curvature_V_MPa2)) > 1:
-            raise RuleError("a declared M is one and the same between all tests")
-        if self.premise == "monotone" or self.curvature_is == "declared" or not self.dp_MPa:
-            return
-        found, errors = bends_of(self.dp_MPa, self.u_threshold_V, ROUNDING)
-        if self.premise == "line":
-            if np.any(np.abs(found) > errors):
-                raise RuleError("the premise is 'line', but the thresholds do not lie on a straight line")
-            return
-        if len(self.dp_MPa) < FEWEST_FOR_CURVATURE:
-            raise RuleError(f"M is estimated from {len(self.dp_MPa)} tests, expected {FEWEST_FOR_CURVATURE} or more")
-        allowed = estimated_curvature(found)
-        if np.any(np.abs(stated - allowed) > ROUNDING + END_FACTOR_OF_THREE * errors.max()):
-            row = int(np.argmax(np.abs(stated - allowed)))
-            raise RuleError(
-                f"M is {1e3 * stated[row]:.4g} mV/MPa² from {self.dp_MPa[row]:g} to {self.dp_MPa[row + 1]:g} MPa, but "
-                f"{1e3 * allowed[row]:.4g} follows from the thresholds at the tests, of which it is estimated"
-            )
-        above = 0.0 if self.above is None else self.above.curvature_V_MPa2
-        if abs(above - curvature_above(found)) > ROUNDING + END_FACTOR_OF_THREE * errors.max():
-            raise RuleError(
-                f"M is {1e3 * above:.4g} mV/MPa² above the tests, but {1e3 * curvature_above(found):.4g} follows from "
-                "the thresholds at the tests, of which it is estimated"
-            )
+        declared = {"line": "line", "monotone": "monotone"}.get(
+            self.premise, "smooth" if self.curvature_is == "declared" else None
+        )
+        if self.proof.declared != declared:
+            raise RuleError(f"the premise is '{self.premise}', but the bound's proof is of '{self.proof.declared}'")
+        self.proof.check(self.bound_dp_MPa, self.bound_V)
 
     @property
     def u_offset_V(self) -> tuple[float, ...]:
@@ -210,41 +170,40 @@ class CertifiedCurve:
         check = next((each for each in self.premises if each.premise == self.premise), None)
         p_value = None if check is None else check.lack_of_fit_p
         tested = "which these tests can't contradict" if p_value is None else f"lack of fit p = {p_value:.2g}"
+        aside = len(self.proof.set_aside)
+        beside = f"; {aside} ramp{'s' * (aside > 1)} set aside, on the premise that it was no closing" if aside else ""
         if self.premise == "line":
-            return f"Premise line: the threshold is a straight line against the pressure drop ({tested})"
-        if self.premise == "smooth":
-            known = f"declared, {tested}"
-            if self.curvature_is == "estimated":
-                known = "estimated from these tests, not proved by them"
-            bends = [1e3 * value for value in self.curvature_V_MPa2]
-            inner, ends = min(bends), {"first": bends[0], "last": bends[-1]}
-            larger = [f"{units.number(end, '.3g mV/MPa²')} in the {name}" for name, end in ends.items() if end > inner]
-            at_ends = f", but {' and '.join(larger)} interval" if larger else ""
+            return f"Premise line: the threshold is a straight line against the pressure drop ({tested}){beside}"
+        if self.premise == "none":
             return (
-                "Premise smooth: between two tests h apart, the threshold lies at most M h²/8 below the straight line "
-                f"between their bounds, M = {units.text(inner, '.3g mV/MPa²')}{at_ends} ({known})"
+                "Nothing is certified between the tests: declare --curve line or monotone, or a --curvature, if the "
+                f"valve is known to be so, or record three pressure drops or more{beside}"
             )
+        if self.premise == "monotone":
+            return (
+                f"Premise monotone: the threshold runs one way over the pressure drop ({tested}): one that is lowest "
+                f"between two tests lies below the bound{beside}"
+            )
+        bend = units.text(1e3 * (self.curvature_V_MPa2 or 0.0), ".3g mV/MPa²")
+        if self.curvature_is == "declared":
+            return f"Premise smooth: the threshold's curvature is at most M = {bend} (declared, {tested}){beside}"
         return (
-            "Premise monotone: between two tests the bound is the lower one's, on the premise that the threshold runs "
-            f"one way there ({tested}): one that is lowest between two tests, in a bend that they do not show, lies "
-            "below it"
+            "Premise smooth: between two tests the threshold has at most one kink or a smooth bend, no stronger than "
+            f"from test to test: M up to {bend} (estimated from these tests, not proved by them){beside}"
         )
 
-    def bound(self, trend: Direction) -> CertifiedBound:
-        """Return the bound on the whole tested interval, exact."""
-        return CertifiedBound.of(self.premise, self.dp_MPa or ANYWHERE, self.u_lower_V, self.curvature_V_MPa2, trend)
+    def bound(self) -> CertifiedBound:
+        """Return the bound, exact: on the whole tested interval, or at the tests alone."""
+        return CertifiedBound.of(self.bound_dp_MPa or ANYWHERE, self.bound_V, apart=self.premise == "none")
 
-    def check_above(self, trend: Direction) -> None:
-        """Refuse a bound above the tests that does not follow from the tests and the premise."""
+    def check_above(self) -> None:
+        """Refuse a bound above the tests that does not begin at the last test."""
         if self.above is not None:
-            lower = self.bound(trend).at(Fraction(repr(self.dp_MPa[-1])))
-            self.above.check(self.premise, trend, self.dp_MPa, self.u_threshold_V, float(lower or 0))
-            if self.curvature_is == "declared" and self.above.curvature_V_MPa2 != self.curvature_V_MPa2[-1]:
-                raise RuleError("a declared M is the same above the tests as between them")
+            self.above.check(self.bound_dp_MPa[-1], self.bound_V[-1])
 
     def check_offset(self, trend: Direction, dp0_MPa: float | None) -> None:
         """Refuse an offset that lies above the bound anywhere, or does not run the way of the trend."""
-        bound, offset = self.bound(trend), np.array(self.offset_V)
+        bound, offset = self.bound(), np.array(self.offset_V)
         nodes = np.array(self.offset_dp_MPa or ANYWHERE)
         if largest_excess(bound, nodes, offset) > ROUNDING_V:
             raise RuleError("the offset does not follow from the tests' lower bounds: it lies above them")

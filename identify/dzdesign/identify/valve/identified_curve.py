@@ -21,7 +21,7 @@ BETA_ROUNDING = 1e-3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class IdentifiedCurve:
-    """Thresholds (knees) of one branch by the joint fit, and their ratio of Eq. (5); one entry for each test."""
+    """Thresholds (knees) of one branch by the fit of the side, and their ratio of Eq. (5); one entry for each test."""
 
     dp_MPa: Annotated[
         tuple[PressureDrop, ...], quantity("MPa", "Tested pressure drops; empty if the pressure drop is unknown.")

@@ -186,7 +186,7 @@ class SideModel:
         for guard in self.certified.values():
             self._check_nodes(guard.dp_MPa, len(guard.u_lower_V))
             guard.check_offset(self.trend or "flat", self.reference.dp_MPa)
-            guard.check_above(self.trend or "flat")
+            guard.check_above()
         self._check_guarded()
         self._check_zero_flow()
         self._check_identified()
@@ -257,6 +257,8 @@ class SideModel:
         curve = self.certified[guard]
         if len(self.tests) < 2:
             return "at one tested pressure drop: the bound holds there alone"
+        if curve.premise == "none":
+            return "at the tested pressure drops alone: nothing is declared between them"
         told = any(each.premise == curve.premise and each.lack_of_fit_p is not None for each in curve.premises)
         stated = curve.premise == "line" or (curve.premise == "smooth" and curve.curvature_is != "estimated")
         declared = "declared, " if curve.premise == "smooth" and stated else ""

@@ -1,6 +1,7 @@
 """Sections on the identified valve: test conditions, data and fit, thresholds, beta over the pressure drop."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from msgspec import UnsetType
@@ -10,7 +11,7 @@ from dzdesign.assess.options import SETS
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.core.units import chance
 from dzdesign.design.compensator import Compensator
-from dzdesign.identify.plots.valve_curves import BOUND_NAMES, draw_beta, draw_thresholds
+from dzdesign.identify.plots.valve_curves import BOUND_NAME, draw_beta, draw_thresholds
 from dzdesign.identify.valve.low_flow import IN_WORDS
 from dzdesign.identify.valve.model import ValveModel, lag_in_words
 from dzdesign.identify.valve.side_model import SideModel
@@ -37,6 +38,8 @@ from dzdesign.report.page import (
 )
 from dzdesign.report.sections.quantities import entry_of, measured_curve_of
 
+#: Nodes nearer to a test than this are in its interval, MPa.
+SAME_MPa = 1e-6
 #: Warnings about the order of the recordings, which bear on the bounds.
 ORDER = ("order", "time-stamps")
 #: What a record may tell -> words in the names of its entries; the first entry that has one counts.
@@ -178,8 +181,12 @@ def thresholds_figure(side: SideModel, guard: str, name: str, both: bool, units:
     def span(values: Sequence[float]) -> str:
         return units.span(min(values), max(values), ".3f V")
 
-    pieces = curve.bound(side.trend or "flat").pieces if several else ()
-    least_to_next = [round(float(piece.least(piece.from_MPa, piece.to_MPa)), 7) for piece in pieces]
+    nodes, bound = np.array(curve.bound_dp_MPa), np.array(curve.bound_V)
+    certified = several and curve.premise != "none"
+    least_to_next = [
+        round(float(bound[(nodes >= low - SAME_MPa) & (nodes <= high + SAME_MPa)].min()), 7)
+        for low, high in pairwise(curve.dp_MPa)
+    ] if certified else []  # fmt: skip
     figure, axes = titled_axes(3.8, name, both)
     draw_thresholds(axes, side, curve, units)
     legend_below(figure, 4)
@@ -189,7 +196,7 @@ def thresholds_figure(side: SideModel, guard: str, name: str, both: bool, units:
         f"Thresholds against the pressure drop{side_words(name, both)}. The {guard} threshold is guarded: the "
         "output at zero command stays below "
         + (
-            f"the {BOUND_NAMES[curve.premise]}, which is what the bounds of all tests together certify between the "
+            f"the {BOUND_NAME}, which is what the bounds of all tests together certify between the "
             f"tests too. {curve.premise_in_words(units)}."
             if several
             else "its lower bound. One pressure drop was tested, and nothing is certified at another."

@@ -208,11 +208,9 @@ def _continued(compensator: Compensator, exact: ExactLaw) -> AboveTests | None:
 
 def _as_tests(continued: AboveTests) -> LotSide:
     """Return the nodes of a continued bound as bounds at tests."""
-    bends = (continued.curvature_V_MPa2, *(0.0 for _ in continued.dp_MPa[2:]))
     return LotSide(
-        trend=None, confidence=1.0, premise="smooth", curvature_V_MPa2=bends, dp_MPa=continued.dp_MPa,
-        u_lower_V=continued.u_lower_V,
-    )  # fmt: skip
+        trend=None, confidence=1.0, tested_MPa=continued.dp_MPa, dp_MPa=continued.dp_MPa, u_lower_V=continued.u_lower_V
+    )
 
 
 def above_checked(inputs: InputCheck, units: RecordedUnits, sign: str) -> Check:

@@ -1,20 +1,15 @@
 """What the zero-command drive leaves to a threshold's lower bound, at every difference of pressure codes.
 
-The bound is argued from the ramp tests again. By monotonicity a threshold that falls with dP is at least the bound of
-any test at a higher dP, one that rises at least that of any test at a lower dP, and of a flat one only the lowest bound
-is known. One of limited curvature, whose second divided difference is at most M, sags below the chord of two tests by a
-parabola at most: 2 f[a, x, b] <= M with f(a) >= A and f(b) >= B says, for x = a + s (b - a),
-f(x) >= A + s (B - A) - M (b - a)² s (1 - s) / 2, whose least value over an interval lies at an end, or where its slope
-is zero. A code stands for all pressures that may have made it; what of a dither the recordings do not have counts as
-drive.
+The bound is argued from the nodes in valve.json again: straight between them, so that its least value over an interval
+lies at an end or at a node inside. A code stands for all pressures that may have made it; what of a dither the
+recordings do not have counts as drive.
 """
 
+from bisect import bisect_left
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import accumulate, pairwise
 from math import ceil, lcm
-from typing import Any
 
 import numpy as np
 
@@ -25,49 +20,41 @@ from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import Differences
 
 
-def sagging_least(bounds: LotSide, low_MPa: np.ndarray, high_MPa: np.ndarray) -> np.ndarray:
-    """Return the least that a threshold of limited curvature, straight for M = 0, may be over many intervals, V.
+class StraightBound:
+    """What is known of a threshold over its tested interval: straight between the nodes of its bound."""
 
-    Each as far as tests reach; infinite for one that no test reaches. Of fractions it is exact, of doubles in doubles.
-    """
-    kind: Any = Fraction if low_MPa.dtype == object else float
-    nodes = [Fraction(repr(dp)) for dp in bounds.dp_MPa]
-    lower = [Fraction(repr(value)) for value in bounds.u_lower_V]
-    found = np.full(low_MPa.shape, np.inf, dtype=low_MPa.dtype)
-    for (a, b), (begin, end), bend in zip(pairwise(nodes), pairwise(lower), bounds.curvature_V_MPa2, strict=True):
-        sag = Fraction(repr(bend)) * (b - a) ** 2 / 2
-        # A + B s + C s² from `start` on, s in units of `width`.
-        start, width, constant, linear, square = map(kind, (a, b - a, begin, end - begin - sag, sag))
-        first, last = (low_MPa - start) / width, (high_MPa - start) / width
-        inside = (last >= 0) & (first <= 1)
-        first, last = np.clip(first, kind(0), kind(1)), np.clip(last, kind(0), kind(1))
-        lowest = np.clip(-linear / (2 * square), first, last) if square else first
-        for share in (first, last, lowest):
-            value = constant + share * (linear + share * square)
-            found = np.where(inside, np.minimum(found, value), found)
-    return found
+    def __init__(self, bounds: LotSide) -> None:
+        self._dp_MPa = [Fraction(repr(dp)) for dp in bounds.dp_MPa]
+        self._lower_V = [Fraction(repr(value)) for value in bounds.u_lower_V]
+        self._in_doubles = np.array(bounds.dp_MPa), np.array(bounds.u_lower_V)
+
+    def at(self, dp_MPa: Fraction) -> Fraction:
+        """Return the bound at a pressure drop; outside the nodes that of the nearest one."""
+        nodes, values = self._dp_MPa, self._lower_V
+        if dp_MPa <= nodes[0] or dp_MPa >= nodes[-1]:
+            return values[0] if dp_MPa <= nodes[0] else values[-1]
+        right = bisect_left(nodes, dp_MPa)
+        share = (dp_MPa - nodes[right - 1]) / (nodes[right] - nodes[right - 1])
+        return values[right - 1] + share * (values[right] - values[right - 1])
+
+    def least(self, low_MPa: Fraction, high_MPa: Fraction) -> Fraction:
+        """Return the least value over an interval, as far as tests reach, V; the interval touches the tested one."""
+        inside = [value for dp, value in zip(self._dp_MPa, self._lower_V, strict=True) if low_MPa < dp < high_MPa]
+        return min([self.at(low_MPa), self.at(high_MPa), *inside])
+
+    def least_in_doubles(self, low_MPa: np.ndarray, high_MPa: np.ndarray) -> np.ndarray:
+        """Return the same of many intervals in double precision; infinite for one that no test reaches."""
+        nodes, values = self._in_doubles
+        found = np.minimum(np.interp(low_MPa, nodes, values), np.interp(high_MPa, nodes, values))
+        for dp, value in zip(nodes, values, strict=True):
+            found = np.where((low_MPa < dp) & (dp < high_MPa), np.minimum(found, value), found)
+        return np.where((high_MPa >= nodes[0]) & (low_MPa <= nodes[-1]), found, np.inf)
 
 
 #: Margins that differ by less than this in doubles, V, are compared exactly.
 CLOSE_V = 1e-9
 #: Whole numbers below this, and their differences, fit 64 bits with a sign.
 LARGEST = 2**62
-
-
-class Staircase:
-    """What is known of a threshold's lower bound, `bounds_V`, at each tested pressure drop, rising, by its monotony."""
-
-    def __init__(self, bounds: LotSide) -> None:
-        pairs = zip(bounds.dp_MPa, bounds.u_lower_V, strict=True)
-        tests = sorted((Fraction(repr(dp)), Fraction(repr(bound))) for dp, bound in pairs)
-        self.dp_MPa, values = [dp for dp, _ in tests], [bound for _, bound in tests]
-        self.falling = bounds.trend == "decreasing"
-        if self.falling:
-            self.bounds_V = list(accumulate(values[::-1], max))[::-1]  # of a test and all above it
-        elif bounds.trend == "increasing":
-            self.bounds_V = list(accumulate(values, max))  # of a test and all below it
-        else:
-            self.bounds_V = [min(values)] * len(values)
 
 
 def guarded_bounds(compensator: Compensator, sign: int) -> LotSide:
@@ -97,15 +84,6 @@ class PressureDrops:
     def ends(self, row: int) -> tuple[Fraction, Fraction]:
         """Return the ends of one difference, MPa."""
         return Fraction(int(self.least[row]), self.scale), Fraction(int(self.most[row]), self.scale)
-
-    def steps_of(self, staircase: Staircase) -> np.ndarray:
-        """Return which bound of a staircase is known at each difference, by its place; -1: none."""
-        ends = np.array([int(dp * self.scale) for dp in staircase.dp_MPa], dtype=self.least.dtype)
-        if staircase.falling:
-            place = np.searchsorted(ends, np.minimum(self.most, ends[-1]), side="left")
-        else:
-            place = np.searchsorted(ends, np.maximum(self.least, ends[0]), side="right") - 1
-        return np.where(self.made & (self.most >= ends[0]) & (self.least <= ends[-1]), place, -1)
 
 
 def pressure_drops(exact: ExactLaw, found: Differences, tested_MPa: Iterable[Fraction]) -> PressureDrops:
@@ -198,23 +176,15 @@ def bounds_at(drops: PressureDrops, bounds: LotSide) -> np.ndarray:
 
 def bound_at(bounds: LotSide, dp_MPa: float) -> Fraction:
     """Return what is known of a valve's threshold at a pressure drop, V; beyond the tests what is at their end."""
-    tested = [Fraction(repr(dp)) for dp in bounds.dp_MPa]
-    at = min(max(Fraction(repr(dp_MPa)), min(tested)), max(tested))
-    scale = lcm(at.denominator, *(dp.denominator for dp in tested))
-    place = np.array([int(at * scale)])
-    return _known(PressureDrops(scale=scale, least=place, most=place, made=np.array([True])), bounds)[1](0)
+    return StraightBound(bounds).at(Fraction(repr(dp_MPa)))
 
 
 def _known(drops: PressureDrops, bounds: LotSide) -> tuple[np.ndarray, Callable[[int], Fraction]]:
     """Return what is known of a threshold, V: in doubles at each difference, and exactly at one."""
-    if bounds.premise == "monotone" or len(bounds.dp_MPa) == 1:  # all between the tests follows from monotony
-        staircase = Staircase(bounds)
-        steps = drops.steps_of(staircase)
-        values = np.where(steps >= 0, np.array(staircase.bounds_V, dtype=float)[steps], np.nan)
-        return values, lambda row: staircase.bounds_V[int(steps[row])]
-    known = sagging_least(bounds, *(each.astype(float) / drops.scale for each in (drops.least, drops.most)))
+    straight = StraightBound(bounds)
+    known = straight.least_in_doubles(*(each.astype(float) / drops.scale for each in (drops.least, drops.most)))
     values = np.where(drops.made & np.isfinite(known), known, np.nan)
-    return values, lambda row: sagging_least(bounds, *(np.array([end], dtype=object) for end in drops.ends(row)))[0]
+    return values, lambda row: straight.least(*drops.ends(row))
 
 
 def counted_dither(compensator: Compensator) -> int:

@@ -92,7 +92,7 @@ def _bounds_V(compensator: Compensator, sign: int) -> Iterator[Fraction]:
     """Yield the lower bound of the guarded threshold, as the worst machine has it, from the first test to the last."""
     side = compensator.valve.sides[SIDE_NAMES[sign]]
     curve = side.certified[compensator.side(sign).certificate.guard]
-    found = [curve.bound(side.trend or "flat")]
+    found = [curve.bound()]
     found += [each.bound() for valve in compensator.lot if (each := valve.side(sign)) is not None]
     machine = compensator.machine
     factor = machine.least_factor if machine else Fraction(1)

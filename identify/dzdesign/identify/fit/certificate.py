@@ -1,0 +1,419 @@
+"""The certified offset: the largest that no threshold contradicts which the data and the premise allow.
+
+    maximise  o(p)   over multipliers l >= 0   with   o = r'l,   A'l = e(p),
+
+where the rows A g >= r are what is known of the next closing's threshold g on the grid: its class, and the data set.
+Any such l proves o on its own: o = l'r <= l'A g = g(p) for every g that meets the rows. So the multipliers stand
+beside the offset, and a reader needs no solver to check it. Its dual, the least g(p) of all, is what a test states in
+cvxpy.
+
+The data set: weighted sums of the ramps' thresholds bound the same sums of the next closing, all at once. The largest
+of their errors has a distribution that is simulated once, with a fixed seed; the error of the scatter itself,
+independent of it, is integrated.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from dzdesign.core.errors import InputError
+from dzdesign.identify.fit.curve_class import CurveClass, Kind, one_way, scatter_of_ramps
+from dzdesign.identify.fit.ramp_model import broken_line
+from dzdesign.identify.fit.scatter import Scatter
+
+#: Shares of the error probability, 1 % by default, of the roofs and of the bound above the tests; and what is kept for
+#: the rule of the bends. The floors have the rest: all of it where only the tests themselves are certified.
+ROOFS, ABOVE, OF_BENDS = 0.05, 0.05, 0.2
+DRAWS, SEED = 40_000, 20240
+#: Neighbouring draws that count as one where the scatter's error is integrated.
+TOGETHER = 8
+#: Largest error of a proof, V per V by which thresholds differ: it is taken off the offset; multipliers that are
+#: rounding; and the slack, mV, below which a row may hold with equality.
+PROOF, SMALLEST, SLACK = 1e-6, 1e-9, 1e-5
+#: Solvers, tried in turn: tight tolerances may leave the first in numerical difficulties. Whichever answers, its
+#: multipliers are solved for once more and prove themselves, so that a poor answer costs an offset and no safety.
+SOLVERS: tuple[tuple[str, dict[str, float]], ...] = (
+    ("highs-ds", {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}),
+    ("highs-ds", {}),
+    ("highs-ipm", {}),
+)
+#: What a number of the file, which has seven decimals, may be off by, V.
+ROUNDING_V = 1.5e-7
+#: Above the tests: the first node over the last pressure drop, each over the one before, the last one.
+FIRST_STEP, STEP, FURTHEST = 1.05, 1.1, 16.0
+#: Times the last pressure drop at which the test that gives the slope is chosen.
+CHOSEN_AT = 2.0
+
+
+class NoCurveAgreesError(InputError):
+    """No threshold of a class agrees with the data."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DataSet:
+    """What is known of the next closing g of a valve in one state: floor <= weights y-like sums of g <= roof (J,)."""
+
+    #: Place in the series, -1/2 or 1/2 where there is a drift, else 0.
+    state: float
+    #: Sums of g on the grid (J, N).
+    rows: np.ndarray
+    #: V; those of the knots come first.
+    floor: np.ndarray
+    roof: np.ndarray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Proof:
+    """The offsets of one state and direction, V (N,), with the rows of each that matter and their multipliers."""
+
+    state: float
+    direction: int
+    offsets: np.ndarray
+    rows: tuple[np.ndarray, ...]
+    multipliers: tuple[np.ndarray, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Criticals:
+    """Standard deviations between the sums and their floors and roofs; those of a knot that scatters unlike apart."""
+
+    floor: float
+    #: None where nothing between the tests is certified.
+    roof: float | None
+    floor_unlike: float | None = None
+    roof_unlike: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Certificate:
+    """The certified bound of a branch's next closing on the grid (N,), chords between."""
+
+    curves: CurveClass
+    data: tuple[DataSet, ...]
+    #: V.
+    bound: np.ndarray
+    criticals: Criticals
+    #: One for each state of the valve and each direction of the class that the data allow.
+    proofs: tuple[Proof, ...]
+
+
+def certify(
+    scatter: Scatter, curves: CurveClass, *, confidence: float = 0.99, unknown_drift: float = 0.0
+) -> Certificate:
+    """Certify the next closing (or opening) of a branch.
+
+    `unknown_drift` is the largest drift over the series, V, that the order of the ramps can't tell.
+
+    Raises
+    ------
+    NoCurveAgreesError
+        If no threshold of the class agrees with the data.
+    """
+    criticals = find_criticals(scatter, curves.kind, 1 - confidence)
+    data = data_sets(scatter, curves.grid_MPa, criticals, unknown_drift)
+    bound, proofs = np.full(curves.grid_MPa.size, np.inf), list[Proof]()
+    refused: NoCurveAgreesError | None = None
+    for each in one_way(curves):
+        for known in data:
+            try:
+                proof = largest_offsets(each, known)
+            except NoCurveAgreesError as error:  # of a direction that is not known, the data may contradict one
+                refused = error
+                continue
+            bound = np.minimum(bound, each.under_chords(proof.offsets))
+            proofs.append(proof)
+    if refused is not None and not proofs:
+        raise refused
+    return Certificate(curves=curves, data=data, bound=bound, criticals=criticals, proofs=tuple(proofs))
+
+
+def largest_offsets(curves: CurveClass, data: DataSet) -> Proof:
+    """Return the largest safe offset at every grid point and the multipliers that prove it."""
+    from scipy.optimize import linprog
+    from scipy.sparse import csr_array, eye_array, kron
+
+    left, right, _ = _from_common_zero(curves, data)
+    count = curves.grid_MPa.size
+    # The programmes of all points at once: the solver is called once in place of thirty times.
+    every, points = kron(eye_array(count), csr_array(left.T), format="csr"), np.eye(count).ravel()
+    for method, options in SOLVERS:
+        solved = linprog(-np.tile(right, count), A_eq=every, b_eq=points, method=method, options=options)
+        if solved.status == 0:
+            break
+    else:
+        raise NoCurveAgreesError(
+            "the thresholds of the ramps agree with no curve of the premise; declare another --curve, or record more "
+            "ramps"
+        )
+    # Rows that hold with equality, or that the solver used.
+    slack, used = (each.reshape(count, -1) for each in (np.abs(solved.lower.marginals), solved.x))
+    return prove(curves, data, [np.flatnonzero(row) for row in (used > SMALLEST) | (slack < SLACK)])
+
+
+def prove(curves: CurveClass, data: DataSet, rows: Sequence[np.ndarray]) -> Proof:
+    """Return the offset that some rows of what is known prove at each grid point, with exact multipliers.
+
+    They are those of `known_rows`. What A'l lacks of e(p), of rounding, counts with what thresholds differ by.
+
+    Raises
+    ------
+    InputError
+        If the rows prove nothing.
+    """
+    from scipy.optimize import nnls
+
+    left, right, base = _from_common_zero(curves, data)
+    # No threshold of the class lies further from the common zero than this.
+    highest = data.roof if np.isfinite(data.roof).all() else data.floor
+    largest = 2 * float(highest.max() - data.floor.min())
+    offsets, kept, multipliers = np.empty(len(rows)), [], []
+    for at, of_point in enumerate(rows):
+        point = np.zeros(left.shape[1])
+        point[at] = 1.0
+        found = nnls(left[of_point].T, point)[0] if of_point.size else np.zeros(0)
+        left_over = float(np.sum(np.abs(found @ left[of_point] - point)))
+        if left_over > PROOF:
+            raise InputError(f"the multipliers of a certified bound miss their proof by {left_over:.1g}")
+        offsets[at] = base + float(right[of_point] @ found) / 1e3 - left_over * largest
+        kept.append(of_point[found > 0])
+        multipliers.append(found[found > 0])
+    return Proof(
+        state=data.state, direction=curves.direction, offsets=offsets, rows=tuple(kept),
+        multipliers=tuple(multipliers),
+    )  # fmt: skip
+
+
+def _from_common_zero(curves: CurveClass, data: DataSet) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return `known_rows` with the right sides in mV from a common zero, and that, V.
+
+    So all numbers of the programme are of one size. Rows that sum to nothing keep theirs.
+    """
+    left, right = known_rows(curves, data)
+    base = float(data.floor.max())
+    return left, 1e3 * (right - base * left.sum(axis=1)), base
+
+
+def known_rows(curves: CurveClass, data: DataSet) -> tuple[np.ndarray, np.ndarray]:
+    """Return all that is known as A g >= r: (R, N), (R,). In this order: class from below, above; floors; roofs."""
+    a, low, high = curves.rows()
+    parts = ((a, low), (-a, -high), (data.rows, data.floor), (-data.rows, -data.roof))
+    kept = [(rows[np.isfinite(right)], right[np.isfinite(right)]) for rows, right in parts]
+    return np.vstack([rows for rows, _ in kept]), np.concatenate([right for _, right in kept])
+
+
+def running_minimum(bound: np.ndarray, direction: int) -> np.ndarray:
+    """Return the law's offset: the largest under the bound that runs one way; 0: that is the same everywhere.
+
+    Of ``maximise sum(o), o <= bound, o[k + 1] <= o[k]`` it is the optimum: each o is some bound's, at this point or
+    before, and that one's multipliers prove it.
+    """
+    if direction == 0:
+        return np.full_like(bound, bound.min())
+    found = np.minimum.accumulate(bound if direction < 0 else bound[::-1])
+    return found if direction < 0 else found[::-1]
+
+
+# ------------------------------------------------------------------------------------------------------- the data set
+def contrasts(scatter: Scatter, state: float) -> np.ndarray:
+    """Return weights (J, n) of the ramps, each with the sum 1, in a valve of that state.
+
+    Knots first; then averages of three neighbours and a straight line at both ends and the middle, which bound curves
+    that bend little more sharply. Where a knot scatters unlike the others they would mix two variances, and stay out.
+    """
+    model = scatter.model
+    count, dp = model.knots_MPa.size, model.ramps.dp_MPa
+    rows = [model.weights[:count] + (state * model.weights[count] if model.drift else 0.0)]
+    if count == 1 or scatter.unlike is not None:
+        return rows[0]
+    rows += [rows[0][at - 1 : at + 2].mean(axis=0, keepdims=True) for at in range(1, count - 1)]
+    clock = [model.ramps.clock] if model.drift and model.ramps.clock is not None else []
+    at = np.array([[1, each, *([state] * len(clock))] for each in (dp.min(), dp.mean(), dp.max())])
+    rows.append(at @ np.linalg.pinv(np.column_stack([np.ones(dp.size), dp, *clock])))
+    return np.vstack(rows)
+
+
+def states_of(scatter: Scatter) -> tuple[float, ...]:
+    """Return the states that the series has seen: both ends of a drift."""
+    return (-0.5, 0.5) if scatter.model.drift else (0.0,)
+
+
+def find_criticals(scatter: Scatter, kind: Kind, error: float) -> Criticals:
+    """Return the critical values of all sums in all states; of two scatters each has half of the error probability."""
+    alone, unlike = kind == "points", scatter.unlike
+    # Of tests alone the sums that mix them would only cost.
+    weights = [contrasts(scatter, state)[: scatter.model.knots_MPa.size if alone else None]
+               for state in states_of(scatter)]  # fmt: skip
+    floors = 1.0 if alone else 1 - ROOFS - ABOVE - (OF_BENDS if kind == "bends" else 0.0)
+    parts = 1 if unlike is None else 2
+
+    def value(rows: np.ndarray, degrees: float, share: float, of_error: float) -> float:
+        return critical(rows, degrees, share, of_error * error / parts)
+
+    every = np.vstack(weights)
+    floor = value(every, scatter.degrees, scatter.share, floors)
+    roof = None if alone else value(every, scatter.degrees, scatter.share, ROOFS)
+    if unlike is None:
+        return Criticals(floor=floor, roof=roof)
+    rows = np.vstack([each[unlike.knot] for each in weights])
+    return Criticals(
+        floor=floor,
+        roof=roof,
+        floor_unlike=value(rows, unlike.degrees, 1.0, floors),
+        roof_unlike=None if alone else value(rows, unlike.degrees, 1.0, ROOFS),
+    )
+
+
+def data_sets(
+    scatter: Scatter, grid_MPa: np.ndarray, criticals: Criticals, unknown_drift: float = 0.0
+) -> tuple[DataSet, ...]:
+    """Return what is known of the next closing in each state of the valve."""
+    unlike, ramps = scatter.unlike, scatter.model.ramps
+    at = broken_line(ramps.dp_MPa, grid_MPa)
+    clock = np.zeros(ramps.y.size) if ramps.clock is None else ramps.clock
+    budget = np.zeros(ramps.y.size) if ramps.budget is None else ramps.budget
+    unknown = 0.0 if scatter.model.drift else unknown_drift
+    found = []
+    for state in states_of(scatter):
+        each = contrasts(scatter, state)
+        if criticals.roof is None:  # tests alone
+            each = each[: scatter.model.knots_MPa.size]
+        next_one = np.full(len(each), scatter.share * scatter.variance)
+        low, high = np.full(len(each), criticals.floor), np.full(len(each), criticals.roof or 0.0)
+        if unlike is not None:
+            next_one[unlike.knot] = max(unlike.variance, scatter.variance)
+            low[unlike.knot], high[unlike.knot] = criticals.floor_unlike or 0.0, criticals.roof_unlike or 0.0
+        sd = np.sqrt(next_one + each**2 @ scatter_of_ramps(scatter))
+        middle = each @ ramps.y
+        wide = unknown * (0.5 + np.abs(each @ clock)) + np.abs(each) @ budget + ramps.shared
+        roof = np.full(len(each), np.inf) if criticals.roof is None else middle + high * sd + wide
+        found.append(DataSet(state=state, rows=each @ at, floor=middle - low * sd - wide, roof=roof))
+    return tuple(found)
+
+
+def critical(weights: np.ndarray, degrees: float, share: float, tail: float) -> float:
+    """Return the standard deviations that the largest error of these sums exceeds with that probability.
+
+    One next closing, with `share` of a ramp's variance, is common to all of them.
+    """
+    rounded = weights.round(9) + 0.0
+    in_order = np.ascontiguousarray(rounded[:, np.lexsort(rounded)])  # whatever order the ramps came in
+    return _critical(in_order.tobytes(), weights.shape, float(degrees), round(share, 2), tail)
+
+
+@lru_cache(maxsize=64)
+def _critical(weights: bytes, shape: tuple[int, int], degrees: float, share: float, tail: float) -> float:
+    from scipy.optimize import brentq
+    from scipy.special import chdtr
+
+    largest = _largest_errors(weights, shape, share)
+    if not np.isfinite(degrees):
+        return float(np.quantile(largest, 1 - tail))
+    largest = np.maximum(np.sort(largest).reshape(-1, TOGETHER).mean(axis=1), 0.0)
+    return float(brentq(lambda c: np.mean(chdtr(degrees, degrees * (largest / c) ** 2)) - tail, 1.0, 1e4, xtol=1e-4))
+
+
+@lru_cache(maxsize=8)
+def _largest_errors(weights: bytes, shape: tuple[int, int], share: float) -> np.ndarray:
+    """Return the largest error of each draw, in its standard deviations; of all sums the ramps and the next closing."""
+    rng, rows = np.random.default_rng(SEED), np.frombuffer(weights).reshape(shape)
+    of_ramps, of_next = rng.standard_normal((DRAWS, shape[1])), rng.standard_normal((DRAWS, 1))
+    errors = of_ramps @ rows.T - np.sqrt(share) * of_next
+    largest: np.ndarray = (errors / np.sqrt(share + np.sum(rows**2, axis=1))).max(axis=1)
+    return largest
+
+
+# --------------------------------------------------------------------------------------------------- above the tests
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AboveBound:
+    """The class continued above the last test: nodes, MPa, and the bound there, V, chords between."""
+
+    dp_MPa: np.ndarray
+    bound: np.ndarray
+    #: False of a threshold that is only known to run one way, and may fall: then it is a guess.
+    certified: bool = True
+
+
+def continue_above(
+    scatter: Scatter,
+    certificate: Certificate,
+    *,
+    confidence: float = 0.99,
+    unknown_drift: float = 0.0,
+) -> AboveBound | None:
+    """Continue the bound above the last test; None where nothing is known between the tests either.
+
+    A threshold that rises, as far as is known, stays; one that may fall goes on with the steepest slope between two
+    tests, and nothing is certified. A line goes on; a curve that bends by at most M lies at most M/2 (x - a)(x - b)
+    below the chord of two tests a < b, b the last. Of all tests that one gives the slope which leaves the largest
+    bound, by their errors and M alone.
+    """
+    curves, model = certificate.curves, scatter.model
+    knots = model.knots_MPa
+    last = float(curves.grid_MPa[-1])
+    if curves.kind == "points":
+        return None
+    steps = [1.0, FIRST_STEP]
+    while steps[-1] * STEP < FURTHEST:
+        steps.append(steps[-1] * STEP)
+    nodes = np.round(last * np.array(steps), 7)
+    if curves.kind == "monotone":
+        rises = curves.direction > 0
+        slope = 0.0 if rises else min(float(np.min(np.diff(model.at_knots) / np.diff(knots))), 0.0)
+        return AboveBound(
+            dp_MPa=nodes, bound=certificate.bound[-1] + slope * (nodes - last), certified=rises
+        )
+    bend = 2.0 * float(curves.density.max()) if curves.kind == "bends" else float(curves.density.max())
+    found = []
+    for start in range(knots.size - 1):
+        band, value = _band_above(scatter, curves, start, nodes, confidence, unknown_drift)
+        sag = bend / 2 * (nodes - last) * (nodes - knots[start])
+        taken_off = float(np.interp(CHOSEN_AT * last, nodes, band + sag))
+        found.append((taken_off, start, value - band - sag))
+        if curves.kind == "line":
+            break
+    bound = min(found, key=lambda each: each[:2])[2]
+    # It is concave, so chords between the nodes lie below it; and it never says more than the last test's own bound.
+    return AboveBound(dp_MPa=nodes, bound=np.minimum.accumulate(np.minimum(bound, certificate.bound[-1])))
+
+
+def _band_above(
+    scatter: Scatter,
+    curves: CurveClass,
+    start: int,
+    nodes: np.ndarray,
+    confidence: float,
+    unknown_drift: float,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return by what errors take off the threshold continued to the nodes, and that, V: the least of all states."""
+    model = scatter.model
+    ramps, count = model.ramps, model.knots_MPa.size
+    clock = np.zeros(ramps.y.size) if ramps.clock is None else ramps.clock
+    budget = np.zeros(ramps.y.size) if ramps.budget is None else ramps.budget
+    share = ((nodes - nodes[0]) / (model.knots_MPa[-1] - model.knots_MPa[start]))[:, None]
+    by_state = []
+    for state in states_of(scatter):
+        if curves.kind == "line":
+            columns = [np.ones(ramps.y.size), ramps.dp_MPa, *([clock] if model.drift else [])]
+            at = np.column_stack([np.ones(nodes.size), nodes, *([np.full(nodes.size, state)] if model.drift else [])])
+            by_state.append(at @ np.linalg.pinv(np.column_stack(columns)))
+            continue
+        rows = model.weights[:count] + (state * model.weights[count] if model.drift else 0.0)
+        by_state.append(rows[-1] + share * (rows[-1] - rows[start]))
+    tail = ABOVE * (1 - confidence)
+    degrees = min(scatter.degrees, scatter.unlike.degrees) if scatter.unlike else scatter.degrees
+    factor = critical(np.vstack(by_state), degrees, scatter.share, tail)
+    variances = scatter_of_ramps(scatter)
+    unknown = 0.0 if model.drift else unknown_drift
+    lows = [
+        (
+            factor * np.sqrt(scatter.share * variances.max() + each**2 @ variances)
+            + unknown * (0.5 + np.abs(each @ clock)) + np.abs(each) @ budget + ramps.shared,
+            each @ ramps.y,
+        )
+        for each in by_state
+    ]  # fmt: skip
+    lowest = np.min([value - band for band, value in lows], axis=0)
+    band = lows[0][1] - lowest
+    return band, lows[0][1]
