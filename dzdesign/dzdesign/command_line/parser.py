@@ -1,6 +1,7 @@
 """The command line as argparse reads it, made of what the commands declare: help in groups, errors of one line."""
 
 import argparse
+import re
 import shutil
 import sys
 from collections.abc import Iterable
@@ -188,7 +189,14 @@ def _add_option(place: argparse._ActionsContainer, argument: Argument) -> None:
         )  # fmt: skip
 
 
-def unknown_words(words: list[str], name: str, command: Parser) -> InputError:
+def is_unknown_option(word: str, parsers: Iterable[Parser]) -> bool:
+    """Tell whether a word looks like an option, and none of the parsers has one that begins so."""
+    name = word.partition("=")[0]
+    known = [option for parser in parsers for option in parser._option_string_actions]
+    return bool(re.match(r"--?[A-Za-z]", word)) and not any(each.startswith(name) for each in known)
+
+
+def unknown_words(words: list[str], command: Parser) -> InputError:
     """Return the error for words that are no option of a command: the nearest that is one, or whose option it is."""
     wrong = next((word for word in words if word.startswith("-")), words[0]).partition("=")[0]
     if not wrong.startswith("-"):
@@ -197,4 +205,4 @@ def unknown_words(words: list[str], name: str, command: Parser) -> InputError:
     owners = [other for other in COMMANDS if any(wrong == each.flag for each in arguments_of_command(other))]
     if owners:
         hint = f" (it is an option of `dzdesign {'`, `'.join(owners)}`)"
-    return InputError(f"`dzdesign {name}` has no option {wrong}{hint}; see `{command.prog} --help`")
+    return InputError(f"`{command.prog}` has no option {wrong}{hint}; see `{command.prog} --help`")
