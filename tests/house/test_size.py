@@ -69,8 +69,7 @@ def test_what_is_not_shipped_does_not_grow():
 
 
 def test_options_do_not_multiply():
-    from dzdesign.command_line.command_table import COMMANDS
-    from dzdesign.command_line.parser import arguments_of_command
+    from dzdesign.command_line.parser import COMMANDS, arguments_of_command
 
     assert judged(sum(len(arguments_of_command(name)) for name in COMMANDS), OPTIONS) == ""
 

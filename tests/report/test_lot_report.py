@@ -13,7 +13,7 @@ import polars
 import pytest
 
 from dzdesign.batch.printing import print_lot
-from dzdesign.batch.results import Results
+from dzdesign.batch.valve_folders import Results
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import sha256_of, to_json
 from dzdesign.core.artefact_types import as_document

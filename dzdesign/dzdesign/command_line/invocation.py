@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from dzdesign.command_line.command_table import COMMANDS
 from dzdesign.command_line.options_file import Value, options_from_file
 from dzdesign.command_line.parser import (
+    COMMANDS,
     arguments_of_command,
     build_parser,
     command_module,

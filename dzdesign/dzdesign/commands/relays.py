@@ -4,6 +4,8 @@ What a stage needs is imported when its command is asked for: the help of one im
 """
 
 import os
+import re
+import shlex
 from collections.abc import Callable, Mapping
 from functools import cached_property
 from pathlib import Path
@@ -11,7 +13,17 @@ from pkgutil import resolve_name
 from typing import Any
 
 from dzdesign.core.errors import RequirementError, one_line
-from dzdesign.terminal.page import print_json
+from dzdesign.core.options import paths_of
+from dzdesign.terminal.page import print_json, say_results
+
+NOT_LOOKED_AT = (
+    "Until that is settled, full command, sides and meter are not looked at. Init with that option and another -o "
+    "does so."
+)
+#: Names of recordings that are repeated in the command to give next.
+MOST_NAMES = 3
+#: A name or a pattern in which no shell finds anything but a name or a pattern.
+PLAIN = re.compile(r"[\w ./*?:\[\],+@%=-]*")
 
 
 class Relay:
@@ -50,7 +62,7 @@ class Relay:
 
 def _written(arguments: Any) -> None:
     plots = f", plots in {arguments.plots}" if getattr(arguments, "plots", None) else ""
-    print(one_line(f"Written: {arguments.output}{plots}"))
+    say_results(f"Written: {arguments.output}{plots}")
 
 
 def _show_valve(valve: Any, arguments: Any) -> None:
@@ -59,14 +71,15 @@ def _show_valve(valve: Any, arguments: Any) -> None:
     print_valve(valve)
     _written(arguments)
     if len(valve.sides) == 2:
-        print("Next, for commands of both signs; state the signal at your converter (and --config, if you use it):")
-        print(one_line(f'  dzdesign design {arguments.output} --command-signal "-10..10 V x 0.12 + 1.5 V"'))
+        say_results(
+            "Next, for commands of both signs; state the signal at your converter (and --config, if you use it):",
+            f'  dzdesign design {arguments.output} --command-signal "-10..10 V x 0.12 + 1.5 V"',
+        )
 
 
 def _show_compensator(compensator: Any, arguments: Any) -> None:
     from dzdesign.design.redesign import hysteresis_choices
-    from dzdesign.terminal.choices_table import print_choices
-    from dzdesign.terminal.tables import print_compensator
+    from dzdesign.terminal.design_tables import print_choices, print_compensator
 
     print_compensator(compensator)
     read_at = compensator.valve.recorded_units.text(compensator.reading_flow_L_min, ".2f L/min")
@@ -86,7 +99,7 @@ def _show_verification(verification: Any, arguments: Any) -> None:
     else:
         print_output_verification(verification)
         to_read = OutputEvidence.FILE_NAME
-    print(one_line(f"Evidence written to {output}; start with {output / to_read}"))
+    say_results(f"Evidence written to {output}; start with {output / to_read}")
 
 
 def _show_assessment(found: Any, arguments: Any) -> None:
@@ -98,7 +111,7 @@ def _show_assessment(found: Any, arguments: Any) -> None:
 
 def _show_simulated(made: Any, arguments: Any) -> None:
     tests = "test" if len(made.files) == 1 else "tests"
-    print(one_line(f"Written: {len(made.files)} simulated ramp {tests} in folder '{arguments.output}'"))
+    say_results(f"Written: {len(made.files)} simulated ramp {tests} in folder '{arguments.output}'")
 
 
 def _show_lot(summary: Any, arguments: Any) -> None:
@@ -132,10 +145,86 @@ def _show_reproduction(made: Any, arguments: Any) -> None:
     from dzdesign.terminal.reproduction_tables import print_reproduction
 
     print_reproduction(made)
-    print(f"Figures, parameters and artefacts: {arguments.output}")
+    say_results(f"Figures, parameters and artefacts: {arguments.output}")
+
+
+def _show_export(made: Any, arguments: Any) -> None:
+    from dzdesign.terminal.output_tables import print_export
+
+    print_export(made)
+    say_results(f"Written: {arguments.output}" if arguments.output else "Nothing is written: give -o FILE")
+
+
+def _document_of_export(made: Any, arguments: Any) -> dict[str, Any]:
+    """Return what was set and what it leaves; shares are of full command and full drive."""
+    from dzdesign.design.signals import SIDE_NAMES
+
+    setting = made.setting
+    sides = {
+        SIDE_NAMES[sign]: {
+            "safe_share": float(offset.share),
+            "lowest_at_MPa": float(offset.lowest_at_MPa),
+            "dp_MPa": [float(end) for end in offset.dp_MPa],
+            "points": [[float(value) for value in node] for node in setting.characteristics[sign].nodes],
+        }
+        for sign, offset in setting.offsets.items()
+    }
+    return {
+        "file": None if arguments.output is None else os.fspath(arguments.output),
+        "device": setting.device.name,
+        "title": setting.device.title,
+        "sources": list(setting.device.sources),
+        "parameters": dict(setting.parameters),
+        "unit": setting.device.unit,
+        "dp_MPa": None if setting.dp_MPa is None else float(setting.dp_MPa),
+        "sides": sides,
+        "dead_zones": [
+            {"side": row.side, "dp_MPa": row.dp_MPa, "fixed": dict(row.fixed), "law": dict(row.law),
+             "fixed_end_L_min": row.fixed_end_L_min, "law_end_L_min": row.law_end_L_min}
+            for row in made.dead_zones
+        ],
+        "notes": list(made.notes),
+        "checks": [{"id": each.id, "name": each.name, "holds": each.holds, "text": each.text} for each in made.checks],
+        "compensator_sha256": made.compensator_sha256,
+    }  # fmt: skip
+
+
+def _show_proposal(proposal: Any, arguments: Any) -> None:
+    for line in (*proposal.seen, *(f"open: {line}" for line in proposal.opens)):
+        say_results(line)
+    if proposal.opens and proposal.u_seen_V is None:
+        say_results(NOT_LOOKED_AT)
+    ramps = [os.fspath(path) for path in paths_of(arguments.ramps)]
+    names = " ".join(map(_word, ramps)) if 0 < len(ramps) <= MOST_NAMES else "RAMP..."
+    written = f"Written: {arguments.output}"
+    say_results(written + ("; fill in what is open, then" if proposal.opens else "; read it, then"))
+    say_results(f"  dzdesign identify {names} --config {_word(os.fspath(arguments.output))}")
+
+
+def _document_of_proposal(proposal: Any, arguments: Any) -> dict[str, Any]:
+    keys = ("labels", "columns", "dp", "u_max_V", "u_seen_V", "valve")
+    return {
+        "file": os.fspath(arguments.output),
+        "recordings": [path.as_posix() for path in proposal.recordings],
+        **{key: getattr(proposal, key) for key in keys},
+        "open": proposal.opens,
+    }
+
+
+def _word(name: str) -> str:
+    """Return a name as one word of any shell; a pattern stays one, and what a shell would run is in quotes."""
+    name = one_line(name)
+    if os.name != "nt" and not PLAIN.fullmatch(name):
+        return shlex.quote(name)
+    return f'"{name}"' if " " in name else name
 
 
 RELAYS: Mapping[str, Relay] = {
+    "init": Relay(
+        "stages.init:InitArguments", "stages.init:init",
+        ("dzdesign init ramps/*.csv", "dzdesign init ramps/*.tdms -o bench2.toml"),
+        _show_proposal, document=_document_of_proposal, holds=lambda proposal, arguments: not proposal.opens,
+    ),
     "identify": Relay(
         "stages.identify:IdentifyArguments", "stages.identify:identify",
         (
@@ -149,6 +238,16 @@ RELAYS: Mapping[str, Relay] = {
         "stages.design:DesignArguments", "stages.design:design",
         ("dzdesign design valve.json", "dzdesign design valve.json --hysteresis play --target cortex-m4"),
         _show_compensator,
+    ),
+    "export": Relay(
+        "stages.export:ExportArguments", "stages.export:export",
+        (
+            "dzdesign export compensator.json --to west        # print the parameters and the dead zone that remains",
+            "dzdesign export compensator.json --to west -o pam199.txt",
+            "dzdesign export compensator.json --to cia408 -o valve.dcf --threshold '1 %'",
+            'dzdesign export compensator.json --to beckhoff -o table.st --table-dp "2 MPa"',
+        ),
+        _show_export, document=_document_of_export,
     ),
     "verify": Relay(
         "stages.verify:VerifyArguments", "stages.verify:verify",

@@ -10,7 +10,7 @@ from dzdesign.core.artefact_files import check_file_may_be_written, read_bytes, 
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.option_readers import percent, quantity
 from dzdesign.core.options import AnyPath, Option, Text
-from dzdesign.stages.given_compensator import given_compensator, refuse_underived
+from dzdesign.stages.design import given_compensator, refuse_underived
 
 if TYPE_CHECKING:
     from dzdesign.codegen.amplifier.device import Device

@@ -22,8 +22,7 @@ from dzdesign.core.options import (
     arguments_of,
     paths_of,
 )
-from dzdesign.stages.recording_order import in_order, stated_order
-from dzdesign.stages.recording_parts import parts_of
+from dzdesign.stages.recording_choices import in_order, parts_of, stated_order
 from dzdesign.stages.recordings import (
     RampArguments,
     check_places,

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions
     from rich.segment import Segment
 
+    from dzdesign.report.page import Table as PageTable
+
 Row = TypeVar("Row")
 #: What makes the cell of a result.
 Column = Callable[[Row], str]
@@ -20,6 +22,10 @@ Column = Callable[[Row], str]
 FILE_WIDTH = 140
 #: Blanks between the columns of a table, where there is room and where there is none; one more stands at its left.
 WIDE_GAP, NARROW_GAP = 3, 1
+#: Characters of a word, such as a file's name, that is not broken in a table.
+LONGEST_WORD = 20
+#: Kinds of a cell of the report that are words.
+WORDS = ("text", "finding", "good", "bad", "open")
 
 
 def new_console() -> "Console":
@@ -49,14 +55,16 @@ def put_line(console: "Console", text: str) -> None:
     console.print(text, markup=False, soft_wrap=True)
 
 
+def say_results(*lines: str) -> None:
+    """Print sentences on stdout, see `put_line`."""
+    console = new_console()
+    for line in lines:
+        put_line(console, line)
+
+
 def put_table(console: "Console", table: "Table") -> None:
     """Print a table."""
     console.print(table, crop=False)
-
-
-def volts(value: float | None) -> str:
-    """Return a voltage for a cell."""
-    return "-" if value is None else f"{value:.3f}"
 
 
 def put_rows(
@@ -68,6 +76,18 @@ def put_rows(
     for row in rows:
         table.add_row(*(cell(row) for cell in columns.values()))
     put_table(console, table)
+
+
+def put_facts(console: "Console", *tables: "PageTable | None") -> None:
+    """Print tables of the report."""
+    for table in filter(None, tables):
+        words = [at for at in range(len(table.columns)) if all(row[at].kind in WORDS for row in table.rows)]
+        printed = Table(table.caption, *table.columns, words=words)
+        for row in table.rows:
+            printed.add_row(*(f"{cell.text} ({cell.more})" if cell.more else cell.text for cell in row))
+        put_table(console, printed)
+        for note in table.notes:
+            put_line(console, note)
 
 
 class Table:
@@ -87,8 +107,10 @@ class Table:
     def _least(self, column: int) -> int:
         """Return the longest word of a column's header and of its words, or its longest number."""
         cells = [row[column] for row in self.rows]
-        unbroken = [word for cell in cells for word in cell.split()] if column in self.words else cells
-        return max((len(word) for word in (*self.headers[column].split(), *unbroken)), default=0)
+        if column not in self.words:
+            return max((len(word) for word in (*self.headers[column].split(), *cells)), default=0)
+        words = [word for cell in (self.headers[column], *cells) for word in cell.split()]
+        return min(max(map(len, words), default=0), LONGEST_WORD)
 
     def _wanted(self, column: int) -> int:
         """Return the width of a column without a wrapped line."""

@@ -12,7 +12,7 @@ from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.report.lot.summary import FailedValve, LotSummary
 from dzdesign.terminal.page import new_console
 from dzdesign.terminal.tables import gains_most
-from dzdesign.terminal.verification_tables import print_scenarios
+from dzdesign.terminal.verification_tables import print_loop
 from dzdesign.verify.loop_results import ScenarioResult
 
 FIGURES = {
@@ -29,11 +29,16 @@ def scenario(name, **figures):
     )  # fmt: skip
 
 
+def evidence_of(*scenarios):
+    """Evidence without ramps."""
+    return SimpleNamespace(closed_loop=SimpleNamespace(pressures=()), scenarios=scenarios)
+
+
 @pytest.mark.parametrize("width", [80, 100, 140])
 def test_scenarios_are_a_table_of_short_rows_and_lines(monkeypatch, capsys, width):
     monkeypatch.setenv("COLUMNS", str(width))
     names = ("step to half command and back", "sensor ahead shows full, or the one behind breaks")
-    print_scenarios([scenario(names[0], **FIGURES), scenario(names[1])], new_console())
+    print_loop(evidence_of(scenario(names[0], **FIGURES), scenario(names[1])), new_console())
     table, _, lines = capsys.readouterr().out.partition(f"{names[0]}: ")
     rows = re.split("─{40,}", table)[1].splitlines()
     assert len([row for row in rows if row.strip()]) <= 3, "a row fills at most two lines"
@@ -45,7 +50,7 @@ def test_scenarios_are_a_table_of_short_rows_and_lines(monkeypatch, capsys, widt
 
 def test_a_flow_that_the_recordings_can_not_show_is_no_zero(capsys):
     hidden = replace(scenario("step", **FIGURES), unseen_below_L_min=0.63, q_peak_at_zero_L_min=0.7)
-    print_scenarios([hidden], new_console())
+    print_loop(evidence_of(hidden), new_console())
     out = capsys.readouterr().out
     assert re.search(r"5\.00 +1\.00 +below 0\.63 +0\.70", out) and "without it flow below 0.63 L/min" in out
 
