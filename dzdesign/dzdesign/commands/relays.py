@@ -6,7 +6,7 @@ What a stage needs is imported when its command is asked for: the help of one im
 import os
 import re
 import shlex
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
 from pkgutil import resolve_name
@@ -27,20 +27,25 @@ PLAIN = re.compile(r"[\w ./*?:\[\],+@%=-]*")
 
 
 class Relay:
-    """A command: where its arguments and its stage are, lines for the help, and how the result is shown and judged."""
+    """A command: where its arguments and its stage are, lines for the help, and how the result is shown and judged.
+
+    `show` is where the function is that prints the result, if it has more to print than the lines of `then`.
+    """
 
     def __init__(
         self,
         arguments: str,
         stage: str,
         examples: tuple[str, ...],
-        show: Callable[[Any, Any], None],
+        show: str,
+        then: Callable[[Any, Any], Iterable[str]],
         *,
         holds: Callable[[Any, Any], bool] = lambda result, arguments: True,
         document: Callable[[Any, Any], Any] = lambda result, arguments: result,
         one_valve: tuple[str, ...] = (),
     ) -> None:
-        self._arguments, self._stage, self._show, self._holds, self._document = arguments, stage, show, holds, document
+        self._arguments, self._stage, self._show, self._then = arguments, stage, show, then
+        self._holds, self._document = holds, document
         self.EXAMPLES = examples
         #: Options of `identify` that the command does not take: without them a valve would be another one.
         self.ONE_VALVE = one_valve
@@ -56,68 +61,46 @@ class Relay:
         if json:
             print_json(self._document(result, arguments))
         else:
-            self._show(result, arguments)
+            if self._show:
+                resolve_name(f"dzdesign.{self._show}")(result)
+            say_results(*self._then(result, arguments))
         return 0 if self._holds(result, arguments) else 1
 
 
-def _written(arguments: Any) -> None:
+def _written(result: Any, arguments: Any) -> tuple[str, ...]:
     plots = f", plots in {arguments.plots}" if getattr(arguments, "plots", None) else ""
-    say_results(f"Written: {arguments.output}{plots}")
+    return (f"Written: {arguments.output}{plots}",)
 
 
-def _show_valve(valve: Any, arguments: Any) -> None:
-    from dzdesign.terminal.tables import print_valve
-
-    print_valve(valve)
-    _written(arguments)
-    if len(valve.sides) == 2:
-        say_results(
-            "Next, for commands of both signs; state the signal at your converter (and --config, if you use it):",
-            f'  dzdesign design {arguments.output} --command-signal "-10..10 V x 0.12 + 1.5 V"',
-        )
+def _after_identify(valve: Any, arguments: Any) -> tuple[str, ...]:
+    if len(valve.sides) < 2:
+        return _written(valve, arguments)
+    return (
+        *_written(valve, arguments),
+        "Next, for commands of both signs; state the signal at your converter (and --config, if you use it):",
+        f'  dzdesign design {arguments.output} --command-signal "-10..10 V x 0.12 + 1.5 V"',
+    )
 
 
-def _show_compensator(compensator: Any, arguments: Any) -> None:
-    from dzdesign.design.redesign import hysteresis_choices
-    from dzdesign.terminal.design_tables import print_choices, print_compensator
-
-    print_compensator(compensator)
-    read_at = compensator.valve.recorded_units.text(compensator.reading_flow_L_min, ".2f L/min")
-    print_choices(hysteresis_choices(compensator), read_at, dithered=compensator.valve.dither is not None)
-    _written(arguments)
-
-
-def _show_verification(verification: Any, arguments: Any) -> None:
+def _after_verify(verification: Any, arguments: Any) -> tuple[str, ...]:
     from dzdesign.report.valve_report import REPORT_NAME
-    from dzdesign.terminal.verification_tables import print_output_verification, print_verification
     from dzdesign.verify.evidence import OutputEvidence
     from dzdesign.verify.verification import Verification
 
-    output, to_read = Path(arguments.output or ""), REPORT_NAME
-    if isinstance(verification, Verification):
-        print_verification(verification)
-    else:
-        print_output_verification(verification)
-        to_read = OutputEvidence.FILE_NAME
-    say_results(f"Evidence written to {output}; start with {output / to_read}")
+    output = Path(arguments.output or "")
+    to_read = REPORT_NAME if isinstance(verification, Verification) else OutputEvidence.FILE_NAME
+    return (f"Evidence written to {output}; start with {output / to_read}",)
 
 
-def _show_assessment(found: Any, arguments: Any) -> None:
-    from dzdesign.terminal.assessment_tables import print_assessment
-
-    print_assessment(found)
-    _written(arguments)
-
-
-def _show_simulated(made: Any, arguments: Any) -> None:
+def _after_simulate(made: Any, arguments: Any) -> tuple[str, ...]:
     tests = "test" if len(made.files) == 1 else "tests"
-    say_results(f"Written: {len(made.files)} simulated ramp {tests} in folder '{arguments.output}'")
+    return (f"Written: {len(made.files)} simulated ramp {tests} in folder '{arguments.output}'",)
 
 
-def _show_lot(summary: Any, arguments: Any) -> None:
-    from dzdesign.batch.printing import print_lot
+def _lines_of_lot(summary: Any, arguments: Any) -> Iterable[str]:
+    from dzdesign.batch.printing import lines_of_lot
 
-    print_lot(summary, Path(arguments.output))
+    return lines_of_lot(summary, Path(arguments.output))
 
 
 def _document_of_lot(summary: Any, arguments: Any) -> dict[str, Any]:
@@ -141,18 +124,8 @@ def _whole_lot(summary: Any, arguments: Any) -> bool:
     return True
 
 
-def _show_reproduction(made: Any, arguments: Any) -> None:
-    from dzdesign.terminal.reproduction_tables import print_reproduction
-
-    print_reproduction(made)
-    say_results(f"Figures, parameters and artefacts: {arguments.output}")
-
-
-def _show_export(made: Any, arguments: Any) -> None:
-    from dzdesign.terminal.output_tables import print_export
-
-    print_export(made)
-    say_results(f"Written: {arguments.output}" if arguments.output else "Nothing is written: give -o FILE")
+def _after_export(made: Any, arguments: Any) -> tuple[str, ...]:
+    return (f"Written: {arguments.output}" if arguments.output else "Nothing is written: give -o FILE",)
 
 
 def _document_of_export(made: Any, arguments: Any) -> dict[str, Any]:
@@ -189,16 +162,15 @@ def _document_of_export(made: Any, arguments: Any) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _show_proposal(proposal: Any, arguments: Any) -> None:
-    for line in (*proposal.seen, *(f"open: {line}" for line in proposal.opens)):
-        say_results(line)
+def _lines_of_proposal(proposal: Any, arguments: Any) -> Iterator[str]:
+    yield from proposal.seen
+    yield from (f"open: {line}" for line in proposal.opens)
     if proposal.opens and proposal.u_seen_V is None:
-        say_results(NOT_LOOKED_AT)
+        yield NOT_LOOKED_AT
     ramps = [os.fspath(path) for path in paths_of(arguments.ramps)]
     names = " ".join(map(_word, ramps)) if 0 < len(ramps) <= MOST_NAMES else "RAMP..."
-    written = f"Written: {arguments.output}"
-    say_results(written + ("; fill in what is open, then" if proposal.opens else "; read it, then"))
-    say_results(f"  dzdesign identify {names} --config {_word(os.fspath(arguments.output))}")
+    yield f"Written: {arguments.output}" + ("; fill in what is open, then" if proposal.opens else "; read it, then")
+    yield f"  dzdesign identify {names} --config {_word(os.fspath(arguments.output))}"
 
 
 def _document_of_proposal(proposal: Any, arguments: Any) -> dict[str, Any]:
@@ -223,7 +195,7 @@ RELAYS: Mapping[str, Relay] = {
     "init": Relay(
         "stages.init:InitArguments", "stages.init:init",
         ("dzdesign init ramps/*.csv", "dzdesign init ramps/*.tdms -o bench2.toml"),
-        _show_proposal, document=_document_of_proposal, holds=lambda proposal, arguments: not proposal.opens,
+        "", _lines_of_proposal, document=_document_of_proposal, holds=lambda proposal, arguments: not proposal.opens,
     ),
     "identify": Relay(
         "stages.identify:IdentifyArguments", "stages.identify:identify",
@@ -232,12 +204,12 @@ RELAYS: Mapping[str, Relay] = {
             "dzdesign identify ramps/*.csv --config dzdesign.toml --plots plots",
             'dzdesign identify ramp.csv --dp "1 MPa" --columns "u=AO0:V, Q=Flow (L/min)"',
         ),
-        _show_valve,
+        "terminal.tables:print_valve", _after_identify,
     ),
     "design": Relay(
         "stages.design:DesignArguments", "stages.design:design",
         ("dzdesign design valve.json", "dzdesign design valve.json --hysteresis play --target cortex-m4"),
-        _show_compensator,
+        "terminal.design_tables:print_design", _written,
     ),
     "export": Relay(
         "stages.export:ExportArguments", "stages.export:export",
@@ -247,7 +219,7 @@ RELAYS: Mapping[str, Relay] = {
             "dzdesign export compensator.json --to cia408 -o valve.dcf --threshold '1 %'",
             'dzdesign export compensator.json --to beckhoff -o table.st --table-dp "2 MPa"',
         ),
-        _show_export, document=_document_of_export,
+        "terminal.output_tables:print_export", _after_export, document=_document_of_export,
     ),
     "verify": Relay(
         "stages.verify:VerifyArguments", "stages.verify:verify",
@@ -257,7 +229,8 @@ RELAYS: Mapping[str, Relay] = {
             'dzdesign verify calibrated/lot/firmware --blocks "calibrated/valves/*/calibration.bin"',
             "dzdesign verify firmware --machine-code",
         ),
-        _show_verification, holds=_holds, document=lambda made, arguments: made.evidence,
+        "terminal.verification_tables:print_result", _after_verify, holds=_holds,
+        document=lambda made, arguments: made.evidence,
     ),
     "assess": Relay(
         "stages.assess:AssessArguments", "stages.assess:assess",
@@ -265,7 +238,7 @@ RELAYS: Mapping[str, Relay] = {
             'dzdesign assess before/*.csv --after after/*.csv --limits "dead_zone_opening = 5 %"',
             "dzdesign assess before/*.csv --after after/*.csv --config dzdesign.toml --plots plots",
         ),
-        _show_assessment, holds=_holds,
+        "terminal.assessment_tables:print_assessment", _written, holds=_holds,
     ),
     "simulate": Relay(
         "stages.simulate:SimulateArguments", "stages.simulate:simulate",
@@ -273,7 +246,7 @@ RELAYS: Mapping[str, Relay] = {
             'dzdesign simulate --dp "1 MPa" --dp "5 MPa" -o ramps',
             "dzdesign simulate --firmware firmware -o after",
         ),
-        _show_simulated, document=lambda made, arguments: made.manifest,
+        "", _after_simulate, document=lambda made, arguments: made.manifest,
     ),
     "batch": Relay(
         "batch.arguments:BatchArguments", "stages.batch:batch",
@@ -282,10 +255,12 @@ RELAYS: Mapping[str, Relay] = {
             'dzdesign batch lot -o calibrated --meter-lag "0.1 s" --calibration block',
             "dzdesign batch lot.csv -o calibrated --verify --dask tcp://10.0.0.5:8786",
         ),
-        _show_lot, holds=_whole_lot, document=_document_of_lot, one_valve=("low_flow",),
+        "batch.printing:print_quantiles", _lines_of_lot, holds=_whole_lot, document=_document_of_lot,
+        one_valve=("low_flow",),
     ),
     "reproduce": Relay(
         "stages.reproduce:ReproduceArguments", "stages.reproduce:reproduce",
-        ("dzdesign reproduce -o reproduction",), _show_reproduction, holds=_holds,
+        ("dzdesign reproduce -o reproduction",), "terminal.reproduction_tables:print_reproduction",
+        lambda made, arguments: (f"Figures, parameters and artefacts: {arguments.output}",), holds=_holds,
     ),
 }  # fmt: skip

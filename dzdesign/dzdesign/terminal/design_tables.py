@@ -40,6 +40,15 @@ def _tables(compensator: "Compensator", nodes: int) -> str:
     return f"beta table: {nodes} nodes"
 
 
+def print_design(compensator: "Compensator") -> None:
+    """Print a compensator, and what each way with the hysteresis would leave."""
+    from dzdesign.design.redesign import hysteresis_choices
+
+    print_compensator(compensator)
+    read_at = compensator.valve.recorded_units.text(compensator.reading_flow_L_min, ".2f L/min")
+    print_choices(hysteresis_choices(compensator), read_at, dithered=compensator.valve.dither is not None)
+
+
 def print_compensator(compensator: "Compensator", console: "Console | None" = None) -> None:
     """Print the law, the certificate, what the choices cost and where it ends."""
     from dzdesign.derivation.law import law

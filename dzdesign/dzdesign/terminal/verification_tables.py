@@ -17,6 +17,16 @@ if TYPE_CHECKING:
     from dzdesign.verify.verification import Verification
 
 
+def print_result(verification: "Verification | OutputVerification") -> None:
+    """Print a verification of a C firmware, or of another output."""
+    from dzdesign.verify.verification import Verification
+
+    if isinstance(verification, Verification):
+        print_verification(verification)
+    else:
+        print_output_verification(verification)
+
+
 def print_verification(verification: "Verification", console: "Console | None" = None) -> None:
     """Print every check, what was not tried, and the closed loop per pressure drop."""
     from dzdesign.verify.verification import label_of_untried, untried_requirements
