@@ -9,8 +9,7 @@ from pkgutil import resolve_name
 from typing import Any, get_type_hints
 
 from dzdesign.codegen.calibration.layout import SHAPE_BITS, Member, members
-from dzdesign.command_line.command_table import COMMANDS
-from dzdesign.command_line.parser import arguments_of_command, command_module, usage_of
+from dzdesign.command_line.parser import COMMANDS, arguments_of_command, command_module, usage_of
 from dzdesign.core.artefact_reading import json_schema
 from dzdesign.core.options import field_docstrings
 from dzdesign.identify.data_quality.catalogue import catalogue
@@ -24,7 +23,7 @@ API = (
             "simulate", "assess", "report", "batch",
         ),
     ),
-    ("dzdesign.initial_options.proposal", ("Proposal",)),
+    ("dzdesign.stages.init", ("Proposal",)),
     ("dzdesign.assess.assessment", ("Assessment",)),
     ("dzdesign.report.page", ("Report",)),
     ("dzdesign.identify.reading.ramp_files", ("RampTest", "read_ramp_file")),

@@ -1,21 +1,25 @@
 """`verify --blocks`: a firmware in block form with the calibration blocks of other valves, each on every input.
 
 This is here and not in verify, which shares no code with what it checks: that a block is the one that follows from its
-compensator.json is asked of the generator itself.
+compensator.json is asked of the generator itself. Every input tries dz_comp() alone; the drive around it takes its
+numbers from the same block, and is tried once for each of their settings. Whose a block is says its serial number and
+the hash of its compensator.json, which the folder of a batch's valve states too: the numbers of the law do not.
 """
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+import os
+import shutil
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dzdesign.block_drives import drives_checked
-from dzdesign.block_identity import beside_another, of_another_valve, repeated
+from dzdesign.core.artefact_files import MANIFEST_NAME
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import SourceFile
 from dzdesign.core.documents import read_bytes, sha256_of
-from dzdesign.core.errors import InputError, RequirementError, quoted
-from dzdesign.stages.given_compensator import refuse_underived
+from dzdesign.core.errors import InputError, RequirementError, and_more, quoted
+from dzdesign.core.placing import scratch_folder
+from dzdesign.stages.design import refuse_underived
 
 if TYPE_CHECKING:
     from dzdesign.codegen.calibration.layout import CalibrationBlock
@@ -162,3 +166,125 @@ def _given_block(path: Path, beside: dict[Path, Mapping[str, Path]]) -> GivenBlo
 def _hashes_in(folder: Path) -> Mapping[str, Path]:
     paths = sorted(path for path in folder.glob("*.json") if path.is_file())
     return {sha256_of(read_bytes(path, "file beside a block")): path for path in paths}
+
+
+#: Entries of a block that say whose it is, how it is shown, and what every input tries.
+OF_ONE_VALVE = (
+    "compensator_sha256", "serial", "record", "u_max_uV", "a_span_Pa", "b_span_Pa", "a_full", "b_full", "sides",
+    "crc32",
+)  # fmt: skip
+#: Blocks that a sentence names.
+NAMED = 3
+#: A block, where it lies, and its compensator.
+Tried = tuple[Path, "CalibrationBlock", "Compensator"]
+
+
+def drives_checked(folder: Path, blocks: Iterable[Tried]) -> Iterator["Check"]:
+    """Yield a requirement for each setting of the drive that blocks have and the block in `folder` has not.
+
+    Ramps count as settings, not so the widths of a play, which differ from valve to valve: one of them is tried.
+    """
+    from dzdesign.codegen.calibration.packing import pack
+    from dzdesign.design.firmware_manifest import BLOCK_FILE
+    from dzdesign.verify.current.current_checks import current_checks
+    from dzdesign.verify.exhaustive.drive_check import drive_follows
+    from dzdesign.verify.requirements import CALIBRATION_BLOCK
+
+    settings: dict[tuple[object, ...], list[Tried]] = {}
+    for each in blocks:
+        settings.setdefault(_settings(each[1]), []).append(each)
+    for (path, block, compensator), *others in settings.values():
+        with scratch_folder() as temporary:
+            shutil.copytree(folder / "core", temporary / "core")
+            (temporary / BLOCK_FILE).write_bytes(pack(block))
+            found = [drive_follows(temporary, compensator)]
+            found += current_checks(temporary, compensator, lambda _: None).checks
+        faults = [f"{check.name}: {check.text}" for check in found if not check.holds]
+        text = "; ".join(faults) or "; ".join(check.text for check in found)
+        alike = and_more([str(other) for other, _, _ in others], NAMED)
+        yield CALIBRATION_BLOCK.check(
+            holds=not faults,
+            name=f"the drive functions with the calibration block: {path}",
+            text=f"{text}{f'; with the same settings: {alike}' if alike else ''}",
+        )
+
+
+def _settings(block: "CalibrationBlock") -> tuple[object, ...]:
+    """Return what the drive around the law follows, but for the widths of a play."""
+    shared = [getattr(block, each.name) for each in fields(block) if each.name not in (*OF_ONE_VALVE, "current")]
+    sides = [(side.ramp_up, side.ramp_down, side.span, any(side.play)) for side in block.sides]
+    return (*shared, *sides, astuple(block.current))
+
+
+#: Files that a sentence names.
+MOST_NAMED = 5
+
+
+def of_another_valve(serial: str, compensator: "Compensator") -> str:
+    """Say that a block's serial number is not the one of the test record; an empty text where nothing contradicts it.
+
+    A block without one says nothing; nor does a recorded one for which a block has no room, so that it was shortened.
+    """
+    from dzdesign.codegen.calibration.block import entry_of_record
+    from dzdesign.codegen.calibration.layout import SERIAL_WORDS
+
+    recorded = entry_of_record(compensator, "serial")
+    if not serial or not recorded or serial == recorded or len(recorded.encode()) > 2 * SERIAL_WORDS:
+        return ""
+    return (
+        f"the serial number is {quoted(serial)}, but the valve whose recordings compensator.json was made from has "
+        f"{quoted(recorded)} by its test record"
+    )
+
+
+def beside_another(path: Path, octets: bytes) -> str:
+    """Say that a block is not the one that a batch wrote into the valve's folder where it lies now.
+
+    That block may be there as another file, so its own octets are compared, whatever the format; nothing is said where
+    the folder is none of a batch.
+    """
+    from dzdesign.design.firmware_manifest import BLOCK_FILE
+    from dzdesign.report.lot.table import read_manifest
+
+    folder = path.absolute().parent
+    if not (folder / MANIFEST_NAME).is_file():
+        return ""
+    try:
+        manifest = read_manifest(folder)
+    except InputError:  # of a firmware, or of something else
+        return ""
+    written = manifest.files.get(BLOCK_FILE)
+    if written in (None, sha256_of(octets)):
+        return ""
+    return (
+        f"the folder is that of valve {quoted(manifest.name)}, for which `dzdesign batch` wrote another block (SHA-256 "
+        f"{written}); run the batch again"
+    )
+
+
+def repeated(blocks: Iterable[tuple[Path, "CalibrationBlock"]]) -> list[tuple[str, str]]:
+    """Return names and fault of blocks that lie in several folders and yet are of one valve.
+
+    One valve has one serial number and one compensator.json; its block as .bin and .hex in its one folder is in order.
+    """
+    from dzdesign.codegen.calibration.packing import octets_of, text_of
+
+    owners: dict[str, dict[str, Path]] = {}
+    for path, block in blocks:
+        folder = os.path.abspath(path.parent)
+        digest = octets_of(block.compensator_sha256).hex()
+        owners.setdefault(f"name the same compensator.json, SHA-256 {digest}", {}).setdefault(folder, path)
+        if serial := text_of(block.serial):
+            owners.setdefault(f"have the serial number {quoted(serial)}", {}).setdefault(folder, path)
+    found: dict[tuple[Path, ...], list[str]] = {}
+    for what, places in owners.items():
+        if len(places) > 1:
+            found.setdefault(tuple(places.values()), []).append(what)
+    return [
+        (
+            and_more([str(path) for path in paths], MOST_NAMED),
+            f"these blocks {' and '.join(what)}: each valve must have its own; load none of "
+            "them before it is clear whose they are",
+        )
+        for paths, what in found.items()
+    ]

@@ -11,8 +11,7 @@ from urllib.parse import unquote
 import pytest
 
 from docs.generated import SCHEMAS, schema_document, schema_text
-from dzdesign.command_line.command_table import COMMANDS
-from dzdesign.command_line.parser import arguments_of_command
+from dzdesign.command_line.parser import COMMANDS, arguments_of_command
 from dzdesign.core.version import __version__
 from tests.support.html_pages import Page
 from tests.support.paths import ROOT

@@ -7,8 +7,7 @@ import sys
 
 import pytest
 
-from dzdesign.command_line.command_table import COMMANDS
-from dzdesign.command_line.parser import CommonArguments, arguments_of_command
+from dzdesign.command_line.parser import COMMANDS, CommonArguments, arguments_of_command
 from dzdesign.core.options import arguments_of
 from dzdesign.identify.data_quality.catalogue import catalogue
 from tests.docs import prose

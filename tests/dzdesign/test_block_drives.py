@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from dzdesign.block_drives import drives_checked
+from dzdesign.block_checks import drives_checked
 from dzdesign.codegen.calibration.block import block_of
 from dzdesign.verify.exhaustive.drive_check import drive_follows
 from tests.support.block_cores import block_folder

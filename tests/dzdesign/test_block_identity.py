@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from dzdesign.block_checks import GivenBlock, blocks_checked
-from dzdesign.block_identity import beside_another, of_another_valve
+from dzdesign.block_checks import GivenBlock, beside_another, blocks_checked, of_another_valve
 from dzdesign.codegen.calibration.block import block_of
 from dzdesign.codegen.calibration.packing import pack, text_of, unpack
 from dzdesign.codegen.project import generate, target_named

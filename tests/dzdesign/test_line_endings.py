@@ -10,7 +10,7 @@ import pytest
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.documents import sha256_of
-from dzdesign.reidentification import GivenFiles, identified_again
+from dzdesign.regeneration import GivenFiles, identified_again
 from tests.support.attacked_firmware import take_the_rest_as_held
 from tests.support.paths import ROOT
 from tests.support.synthetic import needs_compiler

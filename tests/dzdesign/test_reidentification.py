@@ -12,8 +12,7 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.documents import sha256_of
 from dzdesign.core.errors import InputError
 from dzdesign.identify.valve.model import ValveModel
-from dzdesign.regeneration import regenerated
-from dzdesign.reidentification import GivenFiles, identified_again
+from dzdesign.regeneration import GivenFiles, identified_again, regenerated
 from dzdesign.verify.folder import reproduced
 from dzdesign.verify.requirements import AS_STATED
 from tests.support.attacked_firmware import sealed

@@ -14,15 +14,15 @@ ROOM_SIZES = {
     "core": (2795, 15, 0),
     "derivation": (4710, 28, 325),
     "identify": (18150, 130, 1100),
-    "assess": (1690, 13, 0),
-    "design": (6635, 30, 0),
-    "codegen": (7425, 50, 7310),
-    "verify": (9450, 52, 2060),
-    "report": (4400, 20, 535),
-    "dzdesign": (10850, 91, 156),
+    "assess": (1705, 13, 0),
+    "design": (6640, 30, 0),
+    "codegen": (7430, 50, 7310),
+    "verify": (9502, 52, 2060),
+    "report": (4410, 20, 535),
+    "dzdesign": (9430, 65, 156),
 }
 #: Lines of Python of what is not shipped, and of the files that the tests compare with.
-TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 47951, 18000, 8930
+TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 47835, 18000, 8930
 #: Options of all commands together; an option of two commands counts twice.
 OPTIONS = 275
 #: What a number may be above what is there, before it is to be lowered.
@@ -69,8 +69,7 @@ def test_what_is_not_shipped_does_not_grow():
 
 
 def test_options_do_not_multiply():
-    from dzdesign.command_line.command_table import COMMANDS
-    from dzdesign.command_line.parser import arguments_of_command
+    from dzdesign.command_line.parser import COMMANDS, arguments_of_command
 
     assert judged(sum(len(arguments_of_command(name)) for name in COMMANDS), OPTIONS) == ""
 

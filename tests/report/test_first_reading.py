@@ -115,7 +115,7 @@ def test_rows_of_one_scenario_say_which_runs_they_are_of():
 
 def test_init_names_every_entry_of_the_record_that_a_report_asks_for(example_valve):
     """Seeded: the report missed a filter of which the file that `init` writes knew nothing."""
-    template = ROOT / "dzdesign" / "dzdesign" / "initial_options" / "templates" / "dzdesign.toml.jinja"
+    template = ROOT / "dzdesign" / "dzdesign" / "stages" / "templates" / "dzdesign.toml.jinja"
     lines = template.read_text(encoding="utf-8").partition("# [record]\n")[2]
     record = tomllib.loads(lines.replace("# ", ""))
     names = {name.replace("-", " ") for name in record}

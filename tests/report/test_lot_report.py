@@ -12,8 +12,8 @@ import numpy as np
 import polars
 import pytest
 
-from dzdesign.batch.printing import print_lot
-from dzdesign.batch.results import Results
+from dzdesign.batch.printing import print_quantiles
+from dzdesign.batch.valve_folders import Results
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_types import as_document
 from dzdesign.core.documents import sha256_of, to_json
@@ -374,7 +374,7 @@ def test_a_lot_is_shown_in_the_units_of_its_recordings(tmp_path, capsys):
     text = " ".join(Page(html).text.split())
     assert "knee on opening (mA)" in text and f"{4 + 1.6 * spread.at.median:.3f}" in text and "dP0 is at 10 bar" in text
     assert not re.search(r"\(V\)| MPa\b", re.sub(r"<svg.*?</svg>|data:[^\"']*", "", html, flags=re.DOTALL))
-    print_lot(lot.summary, folder)
+    print_quantiles(lot.summary)
     printed = capsys.readouterr().out
     assert "knee opening (mA)" in printed and f"{4 + 1.6 * spread.at.median:.3f}" in printed
     assert f",{rows[0]['knee_opening_V']}," in lot.text

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from dzdesign.batch.results import Results
 from dzdesign.batch.summary import summary_of
+from dzdesign.batch.valve_folders import Results
 from dzdesign.core.documents import sha256_of
 from dzdesign.report.lot.table import HASHED, SIDE_COLUMNS, Cell, column_of, frame_of, table_files
 

@@ -4,18 +4,19 @@ import json
 import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
+from functools import cache
 from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING, NamedTuple
 
 from dzdesign.batch.outputs import ForOutputs, WantedOutput, make_output, may_end_otherwise, reason_of_outputs
 from dzdesign.core.artefact_files import TOOL, write_folder
-from dzdesign.core.artefact_types import THIS_TOOL, SourceFile
+from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
 from dzdesign.core.documents import sha256_of
 from dzdesign.core.errors import DzdesignError, one_line
 from dzdesign.core.placing import scratch_folder
 from dzdesign.design.design_choices import DesignChoices
-from dzdesign.design.firmware_manifest import Calibration
+from dzdesign.design.firmware_manifest import BLOCK_FILE, Calibration
 from dzdesign.report.lot.summary import (
     DOES_NOT_HOLD,
     FAILED,
@@ -30,9 +31,13 @@ from dzdesign.stages.identify import IdentifyChoices
 from dzdesign.terminal.progress import reporting
 
 if TYPE_CHECKING:
+    from dzdesign.codegen.calibration.layout import BuiltFor
     from dzdesign.design.compensator import Compensator
     from dzdesign.identify.valve.model import ValveModel
+    from dzdesign.verify.exhaustive.block_check import BlockFirmware
 
+#: The same block for the programmer at the end of the line.
+BLOCK_IMAGE = "calibration.hex"
 #: Folder of a valve's evidence.
 EVIDENCE = "evidence"
 #: A worker may run several threads; NumPy and the solvers of one process would only get in each other's way.
@@ -195,7 +200,6 @@ def _firmware(
     task: Task, folder: Path, valve: "ValveModel", compensator: "Compensator", recordings: list[Path]
 ) -> tuple[Status, str]:
     """Write a valve's firmware or block into ``folder/out``, and verify it if asked for; return status and reason."""
-    from dzdesign.batch.blocks import write_block
     from dzdesign.codegen.project import generate
     from dzdesign.stages.verify import VerifyArguments, verify_firmware
 
@@ -232,3 +236,40 @@ def _write_recordings(task: Task, folder: Path) -> list[Path]:
         path.write_bytes(content)
         paths.append(path)
     return paths
+
+
+def write_block(compensator: "Compensator", target: str, folder: Path) -> tuple[Status, str]:
+    """Write the block of the compensator.json in `folder`, and what came of every input; return status and reason.
+
+    A compensator that a block has no room for is an `InputError`.
+    """
+    from dzdesign.codegen.calibration.block import block_of, built_for
+    from dzdesign.codegen.calibration.packing import image_of, pack
+    from dzdesign.codegen.project import target_named
+
+    name = "compensator.json"
+    digest = sha256_of((folder / name).read_bytes())
+    octets = pack(block_of(compensator, digest))
+    (folder / BLOCK_FILE).write_bytes(octets)
+    (folder / BLOCK_IMAGE).write_bytes(image_of(octets, "hex", target_named(target).block_place))
+    found = _block_firmware(built_for(compensator)).check(octets, compensator, SourceFile(source=name, sha256=digest))
+    (folder / found.FILE_NAME).write_bytes(to_json_bytes(found))
+    if found.holds:
+        return OK, ""
+    check = found.requirement(BLOCK_FILE, compensator)
+    return DOES_NOT_HOLD, f"{check.name}: {check.text}"
+
+
+@cache
+def _block_firmware(built: "BuiltFor") -> "BlockFirmware":
+    """Return the core as `codegen` writes it, which stays compiled as long as this process lives."""
+    from dzdesign.codegen.project import block_core
+    from dzdesign.verify.exhaustive.block_check import BlockFirmware
+    from dzdesign.verify.toolchain.host_compiler import build_folder
+
+    texts = {name: text.encode() for name, text in block_core(built).items()}
+    folder = build_folder() / f"core-{sha256_of(b''.join(texts.values()))[:32]}"
+    for name, content in texts.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(content)
+    return BlockFirmware(folder)

@@ -7,15 +7,21 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 
-from dzdesign.batch.anomalies import anomalies_of
 from dzdesign.batch.arguments import BatchArguments
 from dzdesign.batch.calibration import Outcome, Task
 from dzdesign.batch.lot_firmware import firmware_left, foreign_block, needing_another, write_lot_firmware
-from dzdesign.batch.outputs import WantedOutput, lot_outputs, wanted_outputs
-from dzdesign.batch.results import Results
+from dzdesign.batch.outputs import WantedOutput, wanted_outputs
 from dzdesign.batch.runners import run_local, run_on_cluster
-from dzdesign.batch.summary import SETTING_NAME, lot_setting_of, setting_summary, summary_of, units_of_lot
-from dzdesign.batch.valve_folders import ValveFolder, table_of_valves
+from dzdesign.batch.summary import (
+    SETTING_NAME,
+    anomalies_of,
+    lot_outputs,
+    lot_setting_of,
+    setting_summary,
+    summary_of,
+    units_of_lot,
+)
+from dzdesign.batch.valve_folders import Results, ValveFolder, table_of_valves
 from dzdesign.batch.valves import Valve, valves_of
 from dzdesign.core.artefact_files import MANIFEST_NAME, write_file, write_files
 from dzdesign.core.artefact_types import to_json_bytes

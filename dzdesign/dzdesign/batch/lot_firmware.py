@@ -6,7 +6,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from dzdesign.batch.blocks import BLOCK_IMAGE
+from dzdesign.batch.calibration import BLOCK_IMAGE
 from dzdesign.batch.valve_folders import ValveFolder
 from dzdesign.core.artefact_files import MANIFEST_NAME
 from dzdesign.core.documents import read_bytes, sha256_of

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dzdesign.batch.arguments import BatchArguments
-from dzdesign.batch.valve_folders import ValveFolder
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.errors import DzdesignError, InputError, nearest
 from dzdesign.core.options import flag_of
@@ -15,7 +14,6 @@ from dzdesign.report.lot.summary import (
     HOLDS,
     NOT_MADE,
     NOT_VERIFIED,
-    LotOutput,
     OutputVerdict,
     ValveOutput,
 )
@@ -111,8 +109,7 @@ def make_output(wanted: WantedOutput, of: ForOutputs) -> ValveOutput:
 
 
 def may_end_otherwise(output: ValveOutput) -> bool:
-    """Tell whether the next run should try an output again: a tool may be there then that was not, or a disk have room.
-    """
+    """Tell whether the next run should try an output again: a tool may be there then that was not, or room."""
     return bool(output.reason) and output.verdict in (NOT_MADE, NOT_VERIFIED)
 
 
@@ -140,24 +137,3 @@ def _found(wanted: WantedOutput, verdict: OutputVerdict, reason: str = "", input
 def reason_of_outputs(outputs: Sequence[ValveOutput]) -> str:
     """Return the reasons of the outputs that are not as they were wanted, each after its output's name."""
     return "; ".join(f"output {each.target}: {each.reason}" for each in outputs if each.reason)
-
-
-def lot_outputs(wanted: Sequence[WantedOutput], found: Sequence[ValveFolder]) -> dict[str, LotOutput]:
-    """Return what batch.json says of the outputs of the valves, as read back from their folders."""
-    return {each.target: _lot_output(each, found) for each in wanted}
-
-
-def _lot_output(wanted: WantedOutput, found: Sequence[ValveFolder]) -> LotOutput:
-    names: dict[OutputVerdict, list[str]] = {HOLDS: [], DOES_NOT_HOLD: [], NOT_VERIFIED: [], NOT_MADE: []}
-    for valve in found:
-        for output in valve.manifest.outputs:
-            if output.target == wanted.target:
-                names[output.verdict].append(valve.name)
-    return LotOutput(
-        folder=wanted.folder,
-        settings=dict(wanted.settings),
-        holds=tuple(names[HOLDS]),
-        does_not_hold=tuple(names[DOES_NOT_HOLD]),
-        not_verified=tuple(names[NOT_VERIFIED]),
-        not_made=tuple(names[NOT_MADE]),
-    )

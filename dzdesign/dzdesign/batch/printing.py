@@ -1,6 +1,6 @@
 """Printed result of `dzdesign batch`: counts, spread, the cost of the lot setting, and why valves failed."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from dzdesign.core.errors import and_more
@@ -8,40 +8,38 @@ from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.report.lot.page import certified_lines, checked_line, cost_lines, output_lines, span, untested_lines
 from dzdesign.report.lot.summary import LOT_SETTING, LotFirmware, LotSummary
 from dzdesign.report.valve_report import REPORT_NAME
-from dzdesign.terminal.page import Table, new_console, put_line, put_table
+from dzdesign.terminal.page import Table, new_console, put_table
 
 #: Valves that are named of one warning, and of those that hold the lot setting down.
 NAMED, BINDING_NAMED = 3, 5
 
 
-def print_lot(summary: LotSummary, folder: Path) -> None:
-    """Print what a lot came to, and where it was written."""
-    console = new_console()
+def print_quantiles(summary: LotSummary) -> None:
+    """Print how the calibrated valves scatter."""
     count = summary.calibrated
     title = f"{count} calibrated valve{'' if count == 1 else 's'} of {summary.valves}"
     table = Table(title, "", "least", "5 %", "median", "95 %", "largest")
     for column, at in summary.quantiles.items():
         values = (at.least, at.q05, at.median, at.q95, at.largest)
         table.add_row(_in_words(column, summary.recorded_units), *_numbers(column, values, summary.recorded_units))
-    put_table(console, table)
-    for line in (*certified_lines(summary.certified_of), *_setting_lines(summary)):
-        put_line(console, line)
-    for line in output_lines(summary):
-        put_line(console, line)
+    put_table(new_console(), table)
+
+
+def lines_of_lot(summary: LotSummary, folder: Path) -> Iterator[str]:
+    """Yield what a lot came to, and where it was written."""
+    count = summary.calibrated
+    yield from (*certified_lines(summary.certified_of), *_setting_lines(summary), *output_lines(summary))
     if summary.firmware:
-        put_line(console, _firmware_line(summary.firmware, folder))
+        yield _firmware_line(summary.firmware, folder)
     warned = sorted(summary.warnings.items(), key=lambda item: len(item[1]))
     if warned:
         few = {code: f" ({', '.join(names)})" if len(names) <= NAMED else "" for code, names in warned}  # where to look
-        put_line(console, "warnings: " + ", ".join(f"{code} {len(names)}{few[code]}" for code, names in warned))
-    for each in summary.failed:
-        put_line(console, f"{each.status}  {each.name}: {each.reason}")
-    for line in summary.anomalies:
-        put_line(console, f"odd: {line}")
-    put_line(
-        console,
+        yield "warnings: " + ", ".join(f"{code} {len(names)}{few[code]}" for code, names in warned)
+    yield from (f"{each.status}  {each.name}: {each.reason}" for each in summary.failed)
+    yield from (f"odd: {line}" for line in summary.anomalies)
+    yield (
         f"{count} of {summary.valves} valves calibrated, {len(summary.failed)} not. Table: {folder}/valves.csv, "
-        f"valves.parquet; to be read: {folder / REPORT_NAME}",
+        f"valves.parquet; to be read: {folder / REPORT_NAME}"
     )
 
 

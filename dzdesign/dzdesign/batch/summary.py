@@ -1,29 +1,43 @@
-"""Content of batch.json: the result of a lot, from its table and its lot setting."""
+"""Content of batch.json: the result of a lot from its table and lot setting, and what is odd across its valves."""
 
-from collections.abc import Mapping
+import os
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from dzdesign.batch.outputs import WantedOutput
+from dzdesign.batch.valve_folders import ValveFolder
+from dzdesign.batch.valves import Valve
+from dzdesign.codegen.calibration.block import entry_of_record
 from dzdesign.core.artefact_files import MANIFEST_NAME
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
 from dzdesign.core.documents import sha256_of
-from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.core.errors import InputError, RequirementError, and_more, quoted
 from dzdesign.core.recorded_units import RecordedUnits, common_units, shown_in
 from dzdesign.design.compensator import Compensator
 from dzdesign.report.lot.spread import spreads_of
 from dzdesign.report.lot.summary import (
+    DOES_NOT_HOLD,
+    HOLDS,
+    NOT_MADE,
+    NOT_VERIFIED,
     OK,
     VALVES,
     FailedValve,
+    LotOutput,
     LotSettingSummary,
     LotSummary,
+    OutputVerdict,
     SmallestMargin,
     UntestedPressures,
 )
+from dzdesign.report.lot.table import by_name
 
 if TYPE_CHECKING:
     from polars import DataFrame
 
     from dzdesign.design.lot_setting import LotSetting
+
 
 SETTING_NAME = "lot_compensator.json"
 
@@ -113,3 +127,101 @@ def setting_summary(setting: "LotSetting") -> LotSettingSummary:
             smallest_margin_V=round(float(setting.worst.margin_V), 7),
         ),
     )
+
+
+def lot_outputs(wanted: Sequence[WantedOutput], found: Sequence[ValveFolder]) -> dict[str, LotOutput]:
+    """Return what batch.json says of the outputs of the valves, as read back from their folders."""
+    return {each.target: _lot_output(each, found) for each in wanted}
+
+
+def _lot_output(wanted: WantedOutput, found: Sequence[ValveFolder]) -> LotOutput:
+    names: dict[OutputVerdict, list[str]] = {HOLDS: [], DOES_NOT_HOLD: [], NOT_VERIFIED: [], NOT_MADE: []}
+    for valve in found:
+        for output in valve.manifest.outputs:
+            if output.target == wanted.target:
+                names[output.verdict].append(valve.name)
+    return LotOutput(
+        folder=wanted.folder,
+        settings=dict(wanted.settings),
+        holds=tuple(names[HOLDS]),
+        does_not_hold=tuple(names[DOES_NOT_HOLD]),
+        not_verified=tuple(names[NOT_VERIFIED]),
+        not_made=tuple(names[NOT_MADE]),
+    )
+
+
+#: Names in a sentence.
+NAMED = 5
+
+
+def anomalies_of(found: Sequence[ValveFolder], folder: Path, valves: Sequence[Valve]) -> list[str]:
+    """Return sentences on a lot as read back from its folder, and as it was given, with patterns of recordings."""
+    overlapping = _overlapping(valves)
+    names = {each.name for each in found}
+    shared = (*_shared_recordings(found, overlapping), *_shared_serials(found, overlapping))
+    return [*overlapping.values(), *shared, *_left_over(names, folder)]
+
+
+def _overlapping(valves: Sequence[Valve]) -> dict[tuple[str, ...], str]:
+    """Return what to say of valves whose patterns match one file, by their names."""
+    owners: dict[str, dict[str, str]] = {}
+    for valve in valves:
+        try:
+            for path, pattern in valve.recordings().items():
+                owners.setdefault(os.path.abspath(path), {})[valve.name] = pattern
+        except InputError:  # such a valve has failed, and says so itself
+            continue
+    shared: dict[tuple[str, ...], list[str]] = {}
+    for place, by in owners.items():
+        if len(by) > 1:
+            shared.setdefault(tuple(by), []).append(place)
+    lines = {}
+    for names, places in shared.items():
+        by = owners[places[0]]
+        more = f" and {len(places) - 1} more" if len(places) > 1 else ""
+        what = " and ".join(f"'{by[name]}' of {name}" for name in names[:2])
+        lines[names] = (
+            f"{and_more(names, NAMED)} take the same file, '{Path(places[0]).name}'{more}: in the column files {what} "
+            "overlap; let each valve's match its own files alone, unless one valve is meant twice, with other options"
+        )
+    return lines
+
+
+def _shared_recordings(found: Sequence[ValveFolder], known: Collection[tuple[str, ...]]) -> list[str]:
+    """A bench that saves a recording under the wrong name gives a valve the firmware of another."""
+    owners: dict[str, list[str]] = {}
+    for each in found:
+        for source in each.manifest.made_from if each.compensator else ():
+            owners.setdefault(source.sha256, []).append(each.name)
+    groups = dict.fromkeys(tuple(dict.fromkeys(names)) for names in owners.values())
+    return [
+        f"{and_more(names, NAMED)} share a recording, byte for byte, in files of their own: was one saved under the "
+        "name of another valve? Their firmware is that valve's; record the ramp test again"
+        for names in groups
+        if len(names) > 1 and names not in known
+    ]
+
+
+def _shared_serials(found: Sequence[ValveFolder], known: Collection[tuple[str, ...]]) -> list[str]:
+    """A block is told from another valve's by its serial number."""
+    owners: dict[str, list[str]] = {}
+    for each in found:
+        if each.compensator and (serial := entry_of_record(each.compensator, "serial")):
+            owners.setdefault(serial, []).append(each.name)
+    return [
+        f"{and_more(names, NAMED)} have the same serial number, {quoted(serial)}, and by it their blocks can't be told "
+        "apart; correct record.serial"
+        for serial, names in owners.items()
+        if len(names) > 1 and tuple(names) not in known
+    ]
+
+
+def _left_over(names: Collection[str], folder: Path) -> list[str]:
+    there = (path.name for path in (folder / VALVES).iterdir() if path.is_dir() and path.name not in names)
+    others = sorted((name for name in there if not name.startswith(".")), key=by_name)
+    if not others:
+        return []
+    return [
+        f"the folder '{VALVES}' holds {and_more(others, NAMED)}, not of this lot: left by an earlier run; take them "
+        "away"
+    ]

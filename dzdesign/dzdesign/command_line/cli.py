@@ -1,4 +1,4 @@
-"""The program: exit statuses and the handling of errors; the commands are listed in `command_table`.
+"""The program: exit statuses and the handling of errors; the commands are listed in `parser`.
 
 Exit status: 0 holds, 1 a requirement does not hold (the message says which) or dzdesign refuses its own result, 2 bad
 input or usage. Every heavy import happens inside the stage that needs it.

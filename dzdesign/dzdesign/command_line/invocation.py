@@ -5,9 +5,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from dzdesign.command_line.command_table import COMMANDS
 from dzdesign.command_line.options_file import Value, options_from_file
-from dzdesign.command_line.parser import arguments_of_command, build_parser, command_module, unknown_words
+from dzdesign.command_line.parser import (
+    COMMANDS,
+    arguments_of_command,
+    build_parser,
+    command_module,
+    is_unknown_option,
+    unknown_words,
+)
 from dzdesign.core.errors import InputError, nearest, quoted
 from dzdesign.core.options import Argument, flag_of
 
@@ -32,11 +38,18 @@ def parse(argv: list[str]) -> Invocation:
     if word and word not in COMMANDS:
         raise InputError(f"there is no command '{word}'{nearest(word, COMMANDS)}; see `dzdesign --help`")
     parser, commands = build_parser(only=word or "")
-    namespace, unknown = parser.parse_known_args(_with_signed_values(argv))
+    words = _with_signed_values(argv)
+    try:
+        namespace, unknown = parser.parse_known_args(words)
+    except InputError:  # what else is missing matters less than an option that does not exist
+        known = commands[word] if word else parser
+        if strange := [each for each in words if is_unknown_option(each, (parser, known))]:
+            raise unknown_words(strange, known) from None
+        raise
     given = vars(namespace)
     name = given.pop("command")
     if unknown:
-        raise unknown_words(unknown, name, commands[name])
+        raise unknown_words(unknown, commands[name])
     json, quiet, verbose = (given.pop(key, False) for key in ("json", "quiet", "verbose"))
     if quiet and verbose:
         raise InputError("--quiet and --verbose contradict each other; give one of them")

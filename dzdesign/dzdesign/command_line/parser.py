@@ -1,6 +1,12 @@
-"""The command line as argparse reads it, made of what the commands declare: help in groups, errors of one line."""
+"""The commands, and the command line as argparse reads it, made of what they declare: grouped help, errors of one line.
+
+A module of `dzdesign.commands` bears a command's name, or a row of `dzdesign.commands.relays`. Such a module has
+``Arguments``, a dataclass of `dzdesign.core.options`, ``EXAMPLES``, lines for the help, and ``run(arguments, json)``,
+which returns the exit status. `dzdesign --help` imports no command's.
+"""
 
 import argparse
+import re
 import shutil
 import sys
 from collections.abc import Iterable
@@ -8,15 +14,54 @@ from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from types import ModuleType
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, NoReturn
 
-from dzdesign.command_line.command_table import COMMANDS, EXAMPLES
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.options import GROUPS, Argument, Option, arguments_of
 from dzdesign.core.version import __version__
 
 if TYPE_CHECKING:
     from dzdesign.commands.relays import Relay
+
+
+class Command(NamedTuple):
+    """A command of the command line: the heading of `dzdesign --help` under which it stands, and its line there."""
+
+    group: str
+    help: str
+
+
+PIPELINE, EVIDENCE, SETUP = "from ramps to firmware", "evidence", "getting started and diagnostics"
+
+COMMANDS = {
+    "init": Command(PIPELINE, "inspect recordings and write a commented dzdesign.toml"),
+    "identify": Command(PIPELINE, "fit the valve to its ramp tests: gain, thresholds and beta(dP), in valve.json"),
+    "design": Command(PIPELINE, "compute the certified law with exact coefficients, in compensator.json"),
+    "codegen": Command(PIPELINE, "write C firmware, or Structured Text, FMUs, a MATLAB function, an amplifier's file"),
+    "calibration": Command(PIPELINE, "write one valve's calibration block, or read one back"),
+    "export": Command(PIPELINE, "compute the fixed dead-zone parameters of an amplifier"),
+    "verify": Command(PIPELINE, "check a firmware on every input and in closed loop, and write the evidence"),
+    "batch": Command(PIPELINE, "calibrate many valves, with one table and one report"),
+    "assess": Command(EVIDENCE, "compare ramp tests without and with the compensator, with limits"),
+    "report": Command(EVIDENCE, "write report.html from the artefacts in a folder"),
+    "derive": Command(EVIDENCE, "derive the paper's equations again: premises, steps and a verdict for each"),
+    "reproduce": Command(EVIDENCE, "compute the paper's numbers and figures again, and compare them"),
+    "demo": Command(SETUP, "run the whole chain on the bundled example"),
+    "simulate": Command(SETUP, "simulate ramp tests of a valve; the files are marked as simulated"),
+    "monitor": Command(SETUP, "record the telemetry of a running firmware as a ramp file"),
+    "load": Command(SETUP, "load a calibration block into an amplifier over its serial line"),
+    "doctor": Command(SETUP, "list compilers, simulators and packages, and how to install what is missing"),
+}
+#: Of the front page.
+EXAMPLES = (
+    "dzdesign demo demo                       run the whole chain on the bundled example",
+    "dzdesign init ramps/*.csv                inspect recordings and write dzdesign.toml",
+    "dzdesign identify ramps/*.csv --config dzdesign.toml",
+    "dzdesign design valve.json               with --command-signal for a valve driven to both sides",
+    "dzdesign codegen compensator.json --target f28335",
+    "dzdesign verify firmware --ramps ramps/*.csv",
+)
+
 
 #: The widest that help is set, in columns: longer lines are hard to read.
 WIDEST = 100
@@ -188,7 +233,14 @@ def _add_option(place: argparse._ActionsContainer, argument: Argument) -> None:
         )  # fmt: skip
 
 
-def unknown_words(words: list[str], name: str, command: Parser) -> InputError:
+def is_unknown_option(word: str, parsers: Iterable[Parser]) -> bool:
+    """Tell whether a word looks like an option, and none of the parsers has one that begins so."""
+    name = word.partition("=")[0]
+    known = [option for parser in parsers for option in parser._option_string_actions]
+    return bool(re.match(r"--?[A-Za-z]", word)) and not any(each.startswith(name) for each in known)
+
+
+def unknown_words(words: list[str], command: Parser) -> InputError:
     """Return the error for words that are no option of a command: the nearest that is one, or whose option it is."""
     wrong = next((word for word in words if word.startswith("-")), words[0]).partition("=")[0]
     if not wrong.startswith("-"):
@@ -197,4 +249,4 @@ def unknown_words(words: list[str], name: str, command: Parser) -> InputError:
     owners = [other for other in COMMANDS if any(wrong == each.flag for each in arguments_of_command(other))]
     if owners:
         hint = f" (it is an option of `dzdesign {'`, `'.join(owners)}`)"
-    return InputError(f"`dzdesign {name}` has no option {wrong}{hint}; see `{command.prog} --help`")
+    return InputError(f"`{command.prog}` has no option {wrong}{hint}; see `{command.prog} --help`")

@@ -4,10 +4,10 @@ import os
 from dataclasses import KW_ONLY, asdict, dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
-from dzdesign.core.errors import InputError, one_line
+from dzdesign.core.errors import InputError
 from dzdesign.core.options import AnyPath, Option, flag_of
 from dzdesign.stages.calibration import CalibrationArguments, ReadCalibrationArguments, calibration, read_calibration
-from dzdesign.terminal.page import print_json
+from dzdesign.terminal.page import print_json, say_results
 
 if TYPE_CHECKING:
     from dzdesign.stages.calibration import CalibrationImage, ReadCalibration
@@ -49,18 +49,18 @@ def run(arguments: Arguments, json: bool) -> int:
         print_json(document)
         return 0
     at = f", at {document['address']} of {made.target}" if made.address is not None else ""
-    print(one_line(f"Written: {document['file']}, {document['octets']} octets{at}"))
+    say_results(f"Written: {document['file']}, {document['octets']} octets{at}")
     target = target_named(made.target)
     sector = target.block_place if target.sector else None
     if made.address is not None and sector and made.address != sector.address:
-        print(f"NOT {sector.address:#x}, where {made.target}'s firmware has its block: {ELSEWHERE}")
-    print(one_line(f"Serial number: {document['serial'] or 'none'}; record: {document['record'] or 'none'}"))
-    print(f"CRC-32 {document['crc32']}; SHA-256 of its compensator.json {document['compensator_sha256']}")
+        say_results(f"NOT {sector.address:#x}, where {made.target}'s firmware has its block: {ELSEWHERE}")
+    say_results(f"Serial number: {document['serial'] or 'none'}; record: {document['record'] or 'none'}")
+    say_results(f"CRC-32 {document['crc32']}; SHA-256 of its compensator.json {document['compensator_sha256']}")
     return 0
 
 
 def _read(arguments: Arguments, json: bool) -> int:
-    from dzdesign.terminal.calibration_tables import print_calibration
+    from dzdesign.terminal.output_tables import print_calibration
 
     for name in OF_WRITING:
         if getattr(arguments, name) is not None:

@@ -10,11 +10,13 @@ from typing import NamedTuple
 
 from dzdesign.core.errors import DzdesignError
 from dzdesign.core.processes import find_program, run_program
-from dzdesign.terminal.page import new_console, print_json, put_line, put_rows
+from dzdesign.terminal.page import Column, new_console, print_json, put_line, put_rows
 
 TINY = "#include <stdint.h>\nint32_t dz_tiny(int32_t a);\nint32_t dz_tiny(int32_t a) { return 3 * a; }\n"
 #: A program that says nothing of its version within this time is taken as it is, s.
 PATIENCE_S = 20
+#: Where a system's programs come from; of any other than these, from Debian's packages.
+SYSTEMS = {"win32": ("Windows", "windows"), "darwin": ("macOS", "macos")}
 
 
 class Tool(NamedTuple):
@@ -61,37 +63,36 @@ class Arguments:
 def run(arguments: Arguments, json: bool) -> int:
     """Print what is there; 1 if no C compiler works, for then nothing can be verified."""
     programs = {tool.name: _found(tool) for tool in (*COMPILERS, *OPTIONAL)}
-    packages = _packages()
-    compiles, compiler = _compiles()
+    packages, (compiles, compiler) = _packages(), _compiles()
     missing = [name for name, version in packages.items() if version is None and name != "ziglang"]
     one_is_there = any(programs[tool.name] for tool in COMPILERS)  # which is enough
     to_get = [tool for tool in (OPTIONAL if one_is_there else (*COMPILERS, *OPTIONAL)) if not programs[tool.name]]
     about = {"dzdesign": _version("dzdesign"), "python": platform.python_version(), "system": platform.platform()}
+    holds = compiles and not missing
     if json:
         print_json({
             **about, "compiles": compiles, "compiler": compiler, "programs": programs, "packages": packages,
-            "to_get": [tool._asdict() for tool in to_get], "holds": compiles and not missing,
+            "to_get": [tool._asdict() for tool in to_get], "holds": holds,
         })  # fmt: skip
-        return 0 if compiles and not missing else 1
+        return 0 if holds else 1
     console = new_console()
     put_line(console, "dzdesign {dzdesign}, Python {python}, {system}".format_map(about))
     versions = {name: (found or {"version": "not found"})["version"] or "found" for name, found in programs.items()}
-    put_rows(
-        console, "Programs", (*COMPILERS, *OPTIONAL),
-        {"program": lambda tool: tool.name, "version": lambda tool: versions[tool.name], "for": lambda t: t.purpose},
-        words=(0, 1, 2),
-    )  # fmt: skip
+    shown: dict[str, Column[Tool]] = {
+        "program": lambda tool: tool.name, "version": lambda tool: versions[tool.name], "for": lambda tool: tool.purpose
+    }  # fmt: skip
+    put_rows(console, "Programs", (*COMPILERS, *OPTIONAL), shown, words=(0, 1, 2))
     listed = ", ".join(f"{name} {version or 'MISSING'}" for name, version in packages.items())
     put_line(console, f"Python packages: {listed.replace('ziglang MISSING', 'ziglang (optional) not there')}")
     if to_get:
-        sources = {"program": "name", "Debian, Ubuntu": "debian", "macOS": "macos", "Windows": "windows"}
-        columns = {heading: attrgetter(field) for heading, field in sources.items()}
-        put_rows(console, "How to get the rest", to_get, columns, words=(0, 1, 2, 3))
+        system, source = SYSTEMS.get(sys.platform, ("Debian, Ubuntu", "debian"))
+        columns = {"program": attrgetter("name"), system: attrgetter(source)}
+        put_rows(console, "How to get the rest (--json: on every system)", to_get, columns, words=(0, 1))
     if missing:
         put_line(console, f"Missing packages: {sys.executable} -m pip install {' '.join(missing)}")
     works = f"A library was compiled, loaded and called with {compiler}: verify can run."
     put_line(console, works if compiles else f"NO C COMPILER WORKS: {compiler}")
-    return 0 if compiles and not missing else 1
+    return 0 if holds else 1
 
 
 def _found(tool: Tool) -> dict[str, str] | None:

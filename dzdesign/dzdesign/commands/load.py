@@ -11,7 +11,7 @@ from dzdesign.core.errors import DzdesignError, InputError, RequirementError, on
 from dzdesign.core.option_readers import number
 from dzdesign.core.options import AnyPath, Option, Text, read_options
 from dzdesign.serial_port import PortLine, open_port
-from dzdesign.terminal.page import print_json
+from dzdesign.terminal.page import print_json, say_results
 from dzdesign.terminal.progress import say, with_bar
 
 if TYPE_CHECKING:
@@ -101,7 +101,7 @@ def run(arguments: Arguments, json: bool) -> int:
     else:
         _print(block, drive, session)
         if drive.serial != before.serial:
-            print(f"Replaced: the block of serial number {one_line(before.serial) or 'none'}")
+            say_results(f"Replaced: the block of serial number {one_line(before.serial) or 'none'}")
     if arguments.serial not in (None, drive.serial):
         raise RequirementError(
             f"the amplifier on {arguments.port} holds the block of serial number {quoted(drive.serial)}, expected "
@@ -240,14 +240,15 @@ def _print(block: _Block | None, drive: "DriveState", session: "LoadSession") ->
 
     if block is not None:
         again = f"; {session.repeats} requests were sent again" if session.repeats else ""
-        print(one_line(f"Loaded and read back: {block.source}{again}"))
-    print(f"Block in use: {_place(drive)}")
+        say_results(f"Loaded and read back: {block.source}{again}")
+    say_results(f"Block in use: {_place(drive)}")
     if drive.block != NO_BLOCK:
-        print(f"Serial number: {one_line(drive.serial) or 'none'}")
-        print(f"CRC-32 {drive.crc:08x}; SHA-256 of its compensator.json begins with {drive.origin:08x}")
+        say_results(f"Serial number: {one_line(drive.serial) or 'none'}")
+        say_results(f"CRC-32 {drive.crc:08x}; SHA-256 of its compensator.json begins with {drive.origin:08x}")
     if drive.refusal:
-        print(f"A block would be refused now: {_reason(drive.refusal)}")
+        say_results(f"A block would be refused now: {_reason(drive.refusal)}")
     if drive.ended:
-        print(f"The last load ended early: {_reason(drive.ended)}")
+        say_results(f"The last load ended early: {_reason(drive.ended)}")
     if drive.flags & VOLATILE:
-        print("This firmware keeps loaded blocks in RAM: without supply they are lost (dz_store.h says what to add)")
+        lost = "without supply they are lost (dz_store.h says what to add)"
+        say_results(f"This firmware keeps loaded blocks in RAM: {lost}")

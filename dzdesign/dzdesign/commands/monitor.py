@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from dzdesign.core.artefact_files import check_file_may_be_written
-from dzdesign.core.errors import InputError, one_line
+from dzdesign.core.errors import InputError
 from dzdesign.core.option_readers import number
 from dzdesign.core.options import AnyPath, Option, Text, read_options
 from dzdesign.serial_port import open_port
-from dzdesign.terminal.page import print_json
+from dzdesign.terminal.page import print_json, say_results
 from dzdesign.terminal.progress import say
 
 if TYPE_CHECKING:
@@ -182,9 +182,9 @@ def _document(arguments: Arguments, recording: "Recording", reader: "FrameReader
 
 def _print(arguments: Arguments, recording: "Recording", reader: "FrameReader") -> None:
     doubled = f", {recording.doubled} came twice" if recording.doubled else ""
-    print(
+    say_results(
         f"{recording.frames} frames in {recording.duration_s:.2f} s: {recording.lost} lost, {reader.bad_crc} with a "
         f"wrong CRC, {reader.skipped} octets skipped, {recording.restarts} restarts of the firmware{doubled}"
     )
-    print(f"Faults: {', '.join(recording.faults) or 'none'}")
-    print(one_line(f"Written: {arguments.output}; add a column Q_Lmin from your flow meter for `dzdesign identify`"))
+    say_results(f"Faults: {', '.join(recording.faults) or 'none'}")
+    say_results(f"Written: {arguments.output}; add a column Q_Lmin from your flow meter for `dzdesign identify`")

@@ -4,31 +4,48 @@ What a stage needs is imported when its command is asked for: the help of one im
 """
 
 import os
-from collections.abc import Callable, Mapping
+import re
+import shlex
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
 from pkgutil import resolve_name
 from typing import Any
 
 from dzdesign.core.errors import RequirementError, one_line
-from dzdesign.terminal.page import print_json
+from dzdesign.core.options import paths_of
+from dzdesign.terminal.page import print_json, say_results
+
+NOT_LOOKED_AT = (
+    "Until that is settled, full command, sides and meter are not looked at. Init with that option and another -o "
+    "does so."
+)
+#: Names of recordings that are repeated in the command to give next.
+MOST_NAMES = 3
+#: A name or a pattern in which no shell finds anything but a name or a pattern.
+PLAIN = re.compile(r"[\w ./*?:\[\],+@%=-]*")
 
 
 class Relay:
-    """A command: where its arguments and its stage are, lines for the help, and how the result is shown and judged."""
+    """A command: where its arguments and its stage are, lines for the help, and how the result is shown and judged.
+
+    `show` is where the function is that prints the result, if it has more to print than the lines of `then`.
+    """
 
     def __init__(
         self,
         arguments: str,
         stage: str,
         examples: tuple[str, ...],
-        show: Callable[[Any, Any], None],
+        show: str,
+        then: Callable[[Any, Any], Iterable[str]],
         *,
         holds: Callable[[Any, Any], bool] = lambda result, arguments: True,
         document: Callable[[Any, Any], Any] = lambda result, arguments: result,
         one_valve: tuple[str, ...] = (),
     ) -> None:
-        self._arguments, self._stage, self._show, self._holds, self._document = arguments, stage, show, holds, document
+        self._arguments, self._stage, self._show, self._then = arguments, stage, show, then
+        self._holds, self._document = holds, document
         self.EXAMPLES = examples
         #: Options of `identify` that the command does not take: without them a valve would be another one.
         self.ONE_VALVE = one_valve
@@ -44,67 +61,46 @@ class Relay:
         if json:
             print_json(self._document(result, arguments))
         else:
-            self._show(result, arguments)
+            if self._show:
+                resolve_name(f"dzdesign.{self._show}")(result)
+            say_results(*self._then(result, arguments))
         return 0 if self._holds(result, arguments) else 1
 
 
-def _written(arguments: Any) -> None:
+def _written(result: Any, arguments: Any) -> tuple[str, ...]:
     plots = f", plots in {arguments.plots}" if getattr(arguments, "plots", None) else ""
-    print(one_line(f"Written: {arguments.output}{plots}"))
+    return (f"Written: {arguments.output}{plots}",)
 
 
-def _show_valve(valve: Any, arguments: Any) -> None:
-    from dzdesign.terminal.tables import print_valve
-
-    print_valve(valve)
-    _written(arguments)
-    if len(valve.sides) == 2:
-        print("Next, for commands of both signs; state the signal at your converter (and --config, if you use it):")
-        print(one_line(f'  dzdesign design {arguments.output} --command-signal "-10..10 V x 0.12 + 1.5 V"'))
-
-
-def _show_compensator(compensator: Any, arguments: Any) -> None:
-    from dzdesign.design.redesign import hysteresis_choices
-    from dzdesign.terminal.choices_table import print_choices
-    from dzdesign.terminal.tables import print_compensator
-
-    print_compensator(compensator)
-    read_at = compensator.valve.recorded_units.text(compensator.reading_flow_L_min, ".2f L/min")
-    print_choices(hysteresis_choices(compensator), read_at, dithered=compensator.valve.dither is not None)
-    _written(arguments)
+def _after_identify(valve: Any, arguments: Any) -> tuple[str, ...]:
+    if len(valve.sides) < 2:
+        return _written(valve, arguments)
+    return (
+        *_written(valve, arguments),
+        "Next, for commands of both signs; state the signal at your converter (and --config, if you use it):",
+        f'  dzdesign design {arguments.output} --command-signal "-10..10 V x 0.12 + 1.5 V"',
+    )
 
 
-def _show_verification(verification: Any, arguments: Any) -> None:
+def _after_verify(verification: Any, arguments: Any) -> tuple[str, ...]:
     from dzdesign.report.valve_report import REPORT_NAME
-    from dzdesign.terminal.verification_tables import print_output_verification, print_verification
     from dzdesign.verify.evidence import OutputEvidence
     from dzdesign.verify.verification import Verification
 
-    output, to_read = Path(arguments.output or ""), REPORT_NAME
-    if isinstance(verification, Verification):
-        print_verification(verification)
-    else:
-        print_output_verification(verification)
-        to_read = OutputEvidence.FILE_NAME
-    print(one_line(f"Evidence written to {output}; start with {output / to_read}"))
+    output = Path(arguments.output or "")
+    to_read = REPORT_NAME if isinstance(verification, Verification) else OutputEvidence.FILE_NAME
+    return (f"Evidence written to {output}; start with {output / to_read}",)
 
 
-def _show_assessment(found: Any, arguments: Any) -> None:
-    from dzdesign.terminal.assessment_tables import print_assessment
-
-    print_assessment(found)
-    _written(arguments)
-
-
-def _show_simulated(made: Any, arguments: Any) -> None:
+def _after_simulate(made: Any, arguments: Any) -> tuple[str, ...]:
     tests = "test" if len(made.files) == 1 else "tests"
-    print(one_line(f"Written: {len(made.files)} simulated ramp {tests} in folder '{arguments.output}'"))
+    return (f"Written: {len(made.files)} simulated ramp {tests} in folder '{arguments.output}'",)
 
 
-def _show_lot(summary: Any, arguments: Any) -> None:
-    from dzdesign.batch.printing import print_lot
+def _lines_of_lot(summary: Any, arguments: Any) -> Iterable[str]:
+    from dzdesign.batch.printing import lines_of_lot
 
-    print_lot(summary, Path(arguments.output))
+    return lines_of_lot(summary, Path(arguments.output))
 
 
 def _document_of_lot(summary: Any, arguments: Any) -> dict[str, Any]:
@@ -128,14 +124,79 @@ def _whole_lot(summary: Any, arguments: Any) -> bool:
     return True
 
 
-def _show_reproduction(made: Any, arguments: Any) -> None:
-    from dzdesign.terminal.reproduction_tables import print_reproduction
+def _after_export(made: Any, arguments: Any) -> tuple[str, ...]:
+    return (f"Written: {arguments.output}" if arguments.output else "Nothing is written: give -o FILE",)
 
-    print_reproduction(made)
-    print(f"Figures, parameters and artefacts: {arguments.output}")
+
+def _document_of_export(made: Any, arguments: Any) -> dict[str, Any]:
+    """Return what was set and what it leaves; shares are of full command and full drive."""
+    from dzdesign.design.signals import SIDE_NAMES
+
+    setting = made.setting
+    sides = {
+        SIDE_NAMES[sign]: {
+            "safe_share": float(offset.share),
+            "lowest_at_MPa": float(offset.lowest_at_MPa),
+            "dp_MPa": [float(end) for end in offset.dp_MPa],
+            "points": [[float(value) for value in node] for node in setting.characteristics[sign].nodes],
+        }
+        for sign, offset in setting.offsets.items()
+    }
+    return {
+        "file": None if arguments.output is None else os.fspath(arguments.output),
+        "device": setting.device.name,
+        "title": setting.device.title,
+        "sources": list(setting.device.sources),
+        "parameters": dict(setting.parameters),
+        "unit": setting.device.unit,
+        "dp_MPa": None if setting.dp_MPa is None else float(setting.dp_MPa),
+        "sides": sides,
+        "dead_zones": [
+            {"side": row.side, "dp_MPa": row.dp_MPa, "fixed": dict(row.fixed), "law": dict(row.law),
+             "fixed_end_L_min": row.fixed_end_L_min, "law_end_L_min": row.law_end_L_min}
+            for row in made.dead_zones
+        ],
+        "notes": list(made.notes),
+        "checks": [{"id": each.id, "name": each.name, "holds": each.holds, "text": each.text} for each in made.checks],
+        "compensator_sha256": made.compensator_sha256,
+    }  # fmt: skip
+
+
+def _lines_of_proposal(proposal: Any, arguments: Any) -> Iterator[str]:
+    yield from proposal.seen
+    yield from (f"open: {line}" for line in proposal.opens)
+    if proposal.opens and proposal.u_seen_V is None:
+        yield NOT_LOOKED_AT
+    ramps = [os.fspath(path) for path in paths_of(arguments.ramps)]
+    names = " ".join(map(_word, ramps)) if 0 < len(ramps) <= MOST_NAMES else "RAMP..."
+    yield f"Written: {arguments.output}" + ("; fill in what is open, then" if proposal.opens else "; read it, then")
+    yield f"  dzdesign identify {names} --config {_word(os.fspath(arguments.output))}"
+
+
+def _document_of_proposal(proposal: Any, arguments: Any) -> dict[str, Any]:
+    keys = ("labels", "columns", "dp", "u_max_V", "u_seen_V", "valve")
+    return {
+        "file": os.fspath(arguments.output),
+        "recordings": [path.as_posix() for path in proposal.recordings],
+        **{key: getattr(proposal, key) for key in keys},
+        "open": proposal.opens,
+    }
+
+
+def _word(name: str) -> str:
+    """Return a name as one word of any shell; a pattern stays one, and what a shell would run is in quotes."""
+    name = one_line(name)
+    if os.name != "nt" and not PLAIN.fullmatch(name):
+        return shlex.quote(name)
+    return f'"{name}"' if " " in name else name
 
 
 RELAYS: Mapping[str, Relay] = {
+    "init": Relay(
+        "stages.init:InitArguments", "stages.init:init",
+        ("dzdesign init ramps/*.csv", "dzdesign init ramps/*.tdms -o bench2.toml"),
+        "", _lines_of_proposal, document=_document_of_proposal, holds=lambda proposal, arguments: not proposal.opens,
+    ),
     "identify": Relay(
         "stages.identify:IdentifyArguments", "stages.identify:identify",
         (
@@ -143,12 +204,22 @@ RELAYS: Mapping[str, Relay] = {
             "dzdesign identify ramps/*.csv --config dzdesign.toml --plots plots",
             'dzdesign identify ramp.csv --dp "1 MPa" --columns "u=AO0:V, Q=Flow (L/min)"',
         ),
-        _show_valve,
+        "terminal.tables:print_valve", _after_identify,
     ),
     "design": Relay(
         "stages.design:DesignArguments", "stages.design:design",
         ("dzdesign design valve.json", "dzdesign design valve.json --hysteresis play --target cortex-m4"),
-        _show_compensator,
+        "terminal.design_tables:print_design", _written,
+    ),
+    "export": Relay(
+        "stages.export:ExportArguments", "stages.export:export",
+        (
+            "dzdesign export compensator.json --to west        # print the parameters and the dead zone that remains",
+            "dzdesign export compensator.json --to west -o pam199.txt",
+            "dzdesign export compensator.json --to cia408 -o valve.dcf --threshold '1 %'",
+            'dzdesign export compensator.json --to beckhoff -o table.st --table-dp "2 MPa"',
+        ),
+        "terminal.output_tables:print_export", _after_export, document=_document_of_export,
     ),
     "verify": Relay(
         "stages.verify:VerifyArguments", "stages.verify:verify",
@@ -158,7 +229,8 @@ RELAYS: Mapping[str, Relay] = {
             'dzdesign verify calibrated/lot/firmware --blocks "calibrated/valves/*/calibration.bin"',
             "dzdesign verify firmware --machine-code",
         ),
-        _show_verification, holds=_holds, document=lambda made, arguments: made.evidence,
+        "terminal.verification_tables:print_result", _after_verify, holds=_holds,
+        document=lambda made, arguments: made.evidence,
     ),
     "assess": Relay(
         "stages.assess:AssessArguments", "stages.assess:assess",
@@ -166,7 +238,7 @@ RELAYS: Mapping[str, Relay] = {
             'dzdesign assess before/*.csv --after after/*.csv --limits "dead_zone_opening = 5 %"',
             "dzdesign assess before/*.csv --after after/*.csv --config dzdesign.toml --plots plots",
         ),
-        _show_assessment, holds=_holds,
+        "terminal.assessment_tables:print_assessment", _written, holds=_holds,
     ),
     "simulate": Relay(
         "stages.simulate:SimulateArguments", "stages.simulate:simulate",
@@ -174,7 +246,7 @@ RELAYS: Mapping[str, Relay] = {
             'dzdesign simulate --dp "1 MPa" --dp "5 MPa" -o ramps',
             "dzdesign simulate --firmware firmware -o after",
         ),
-        _show_simulated, document=lambda made, arguments: made.manifest,
+        "", _after_simulate, document=lambda made, arguments: made.manifest,
     ),
     "batch": Relay(
         "batch.arguments:BatchArguments", "stages.batch:batch",
@@ -183,10 +255,12 @@ RELAYS: Mapping[str, Relay] = {
             'dzdesign batch lot -o calibrated --meter-lag "0.1 s" --calibration block',
             "dzdesign batch lot.csv -o calibrated --verify --dask tcp://10.0.0.5:8786",
         ),
-        _show_lot, holds=_whole_lot, document=_document_of_lot, one_valve=("low_flow",),
+        "batch.printing:print_quantiles", _lines_of_lot, holds=_whole_lot, document=_document_of_lot,
+        one_valve=("low_flow",),
     ),
     "reproduce": Relay(
         "stages.reproduce:ReproduceArguments", "stages.reproduce:reproduce",
-        ("dzdesign reproduce -o reproduction",), _show_reproduction, holds=_holds,
+        ("dzdesign reproduce -o reproduction",), "terminal.reproduction_tables:print_reproduction",
+        lambda made, arguments: (f"Figures, parameters and artefacts: {arguments.output}",), holds=_holds,
     ),
 }  # fmt: skip

@@ -6,7 +6,7 @@ from pathlib import Path
 from dzdesign.core.errors import InputError
 from dzdesign.stages.report import ReportArguments, report
 from dzdesign.terminal.output_tables import print_outputs
-from dzdesign.terminal.page import print_json
+from dzdesign.terminal.page import print_json, say_results
 from dzdesign.terminal.progress import say
 
 Arguments = ReportArguments
@@ -28,9 +28,9 @@ def run(arguments: Arguments, json: bool) -> int:
         outputs = {"outputs": [asdict(each) for each in made.outputs.listed], "other_outputs": made.outputs.others}
         print_json({"report": str(output), **verdict, "missing": made.missing, **outputs})
     else:
-        print(made.verdict)
+        say_results(made.verdict)
         print_outputs(made.outputs)
-        print(f"Written: {output}")
+        say_results(f"Written: {output}")
     return 0 if made.kind == "good" else 1
 
 

@@ -8,15 +8,14 @@ from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.documents import sha256_of
 from dzdesign.core.placing import scratch_folder
-from dzdesign.derivation.account.published import DP0_MPA, FIRST, RAMP_S, RECORDS_HZ, U_MAX_V
+from dzdesign.derivation.account.published import DP0_MPA, RAMP_S, RECORDS_HZ, U_MAX_V
 from dzdesign.design.designing import design
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_files import SIMULATED_MARK, ramp_file_bytes, read_ramp_file
 from dzdesign.reproduce.artefact import Hashes, ReproducedValve
-from dzdesign.reproduce.load_and_oil import LoadAndOil, run_load_and_oil
 from dzdesign.reproduce.recovered_valves import RecoveredValve
-from dzdesign.reproduce.valve_runs import PRESSURES_MPA, ValveRuns, run_valve
+from dzdesign.reproduce.runs import PRESSURES_MPA, ValveRuns, run_valve
 from dzdesign.verify.closed_loop.loop import ClosedLoop, RampSequence
 from dzdesign.verify.closed_loop.plant import L_MIN, MPA
 from dzdesign.verify.closed_loop.simulated_recordings import Bench, simulate_ramp
@@ -32,14 +31,11 @@ class Chain:
     files: dict[str, str]
     valve: ReproducedValve
     runs: ValveRuns
-    #: Of the first valve, which Section 4.3 is about.
-    load_and_oil: LoadAndOil | None = None
 
 
 def run_chain(valve: RecoveredValve, say: Callable[[str], None] = lambda _: None) -> Chain:
     """Run a recovered valve through the product; `say` is called before each stage."""
-    name = valve.published.name + (" with hysteresis" if valve.plant.hysteresis_V else "")
-    bench = bench_of(valve)
+    name, bench = valve.published.name, bench_of(valve)
     with scratch_folder() as scratch:
         say(f"{name}: ramp tests of the recovered valve")
         ramps = _ramp_tests(valve, bench)
@@ -66,7 +62,6 @@ def run_chain(valve: RecoveredValve, say: Callable[[str], None] = lambda _: None
         say(f"{name}: closed loop")
         loop = ClosedLoop(valve.plant, scratch / "firmware", compensator)
         runs = run_valve(valve, loop, compensator)
-        beside = run_load_and_oil(valve, loop, product=True) if valve.published is FIRST else None
     place = name.replace(" ", "_")
     return Chain(
         files={
@@ -75,11 +70,8 @@ def run_chain(valve: RecoveredValve, say: Callable[[str], None] = lambda _: None
             f"{place}/compensator.json": compensator_json,
         },
         valve=ReproducedValve(
-            valve=valve.published.name,
-            hysteresis_V=valve.plant.hysteresis_V,
+            valve=name,
             parameters=valve.parameters(),
-            fitted_to=valve.figures,
-            at_bound=valve.at_bound,
             level_L_min=valve.level_L_min,
             bench=bench,
             sha256=Hashes(
@@ -92,7 +84,6 @@ def run_chain(valve: RecoveredValve, say: Callable[[str], None] = lambda _: None
             ),
         ),
         runs=runs,
-        load_and_oil=beside,
     )
 
 
@@ -123,8 +114,8 @@ def _ramp_tests(valve: RecoveredValve, bench: Bench) -> dict[str, bytes]:
 def _plant_toml(valve: RecoveredValve) -> str:
     """Return the plant as a file for `dzdesign verify --plant`, each parameter marked."""
     lines = [
-        f"# The paper's {valve.published.name}. Its Table 1 is an image, so the parameters are recovered by a fit from",
-        "# the printed figures, as far as these determine them.",
+        f"# The paper's {valve.published.name}. Its Table 1 is an image, so the parameters are recovered from the",
+        "# printed figures, as far as these determine them.",
     ]
     for name, parameter in valve.parameters().items():
         reach = f", to {parameter.rounding:g} for the rounding of the print" if parameter.rounding else ""

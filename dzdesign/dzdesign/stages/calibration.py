@@ -4,12 +4,11 @@ from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from dzdesign.block_checks import other_numbers
-from dzdesign.block_identity import of_another_valve
+from dzdesign.block_checks import of_another_valve, other_numbers
 from dzdesign.core.artefact_files import check_file_may_be_written, write_file
 from dzdesign.core.errors import InputError, nearest, quoted
 from dzdesign.core.options import AnyPath, Option, Text
-from dzdesign.stages.given_compensator import given_compensator, refuse_underived
+from dzdesign.stages.design import given_compensator, refuse_underived
 
 if TYPE_CHECKING:
     from dzdesign.codegen.calibration.layout import CalibrationBlock

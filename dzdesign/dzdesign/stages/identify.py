@@ -6,9 +6,10 @@ from dataclasses import KW_ONLY, dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from dzdesign.core.artefact_types import quantity
 from dzdesign.core.dither import read_dithered
 from dzdesign.core.errors import InputError, quoted
-from dzdesign.core.option_readers import number, percent, quantity
+from dzdesign.core.option_readers import number, percent
 from dzdesign.core.options import (
     FIT,
     METER,
@@ -22,8 +23,7 @@ from dzdesign.core.options import (
     arguments_of,
     paths_of,
 )
-from dzdesign.stages.recording_order import in_order, stated_order
-from dzdesign.stages.recording_parts import parts_of
+from dzdesign.stages.recording_choices import in_order, parts_of, stated_order
 from dzdesign.stages.recordings import (
     RampArguments,
     check_places,

@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from dzdesign.core.artefact_files import check_folder_may_be_written, write_folder
+from dzdesign.core.artefact_types import quantity
 from dzdesign.core.dither import read_dithered
 from dzdesign.core.errors import InputError
-from dzdesign.core.option_readers import percent, quantity, whole_number
+from dzdesign.core.option_readers import percent, whole_number
 from dzdesign.core.options import AnyPath, Option, Text, Texts, read_options, texts_of
 from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.core.units import parse_quantity
@@ -33,9 +34,7 @@ class SimulateArguments:
     """Folder made by `dzdesign codegen`. Its compensator then drives the valve."""
     dp: Annotated[Texts, Option("P", example="1 MPa")] = ()
     """Pressure drop of a ramp test (default: 0.5, 1, 2, 3, 4 and 5 MPa). Repeatable."""
-    repeats: Annotated[
-        int | str, Option("N", read=whole_number("a whole number such as 3", least=1, digits=3))
-    ] = "1"
+    repeats: Annotated[int | str, Option("N", read=whole_number("a whole number such as 3", least=1, digits=3))] = "1"
     """Number of ramps at each pressure drop, one file each. From 2 on they are in random order, with date and time."""
     repeatability: Annotated[Text, Option("S", example="0.1 %", read=percent("0.1 %"))] = None
     """Standard deviation of the threshold from ramp to ramp, in percent of full command (default: 0)."""

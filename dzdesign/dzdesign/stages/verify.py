@@ -176,7 +176,7 @@ def _ramp_checks(
     folder: Path, arguments: VerifyArguments, identified: "ValveModel | None"
 ) -> "Callable[[Callable[[str], None], bool], list[Check]] | None":
     """Return what checks a folder with the recordings that were given, for `say` and whether the core ran."""
-    from dzdesign.reidentification import GivenFiles, identified_again, inputs_again
+    from dzdesign.regeneration import GivenFiles, identified_again, inputs_again
     from dzdesign.verify.folder import read_compensator
 
     if not paths_of(arguments.ramps):

@@ -1,13 +1,206 @@
-"""What `dzdesign report` prints of the outputs that were made of one compensator."""
+"""Tables of what is made beside a firmware: an amplifier's setting, a calibration block read back, the outputs."""
 
+from functools import partial
+from math import isinf
 from typing import TYPE_CHECKING
 
-from dzdesign.terminal.page import new_console, put_line, put_rows
+from dzdesign.terminal.page import Column, new_console, put_line, put_rows
+from dzdesign.terminal.tables import put_units
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from rich.console import Console
 
+    from dzdesign.codegen.calibration.reading import (
+        CalibrationReading,
+        DriveReading,
+        NodeReading,
+        SensorReading,
+        SideReading,
+    )
+    from dzdesign.core.recorded_units import RecordedUnits
+    from dzdesign.design.fixed_offset import FixedDeadZone, FixedOffset
     from dzdesign.report.artefacts import MadeOutputs
+    from dzdesign.stages.calibration import ReadCalibration
+    from dzdesign.stages.export import AmplifierExport
+
+
+BRANCHES = ("opening", "closing")
+
+
+def print_export(made: "AmplifierExport", console: "Console | None" = None) -> None:
+    """Print what a device is told, and for each side what is left at the tested pressure drops."""
+    from dzdesign.design.signals import SIDE_NAMES
+
+    console = console or new_console()
+    setting, units = made.setting, made.compensator.valve.recorded_units
+    device = setting.device
+    words = ", ".join(f"{name} {counts}" for name, counts in setting.parameters.items())
+    if setting.dp_MPa is None:
+        put_line(console, f"{device.title}, {device.description}: {words} (unit {device.unit})")
+    else:
+        at = units.text(float(setting.dp_MPa), ".2f MPa")
+        put_line(console, f"{device.title}, {device.description}: law at {at}")
+    for sign, offset in setting.offsets.items():
+        side = SIDE_NAMES[sign]
+        label = "" if len(setting.offsets) == 1 else f"{side} side: "
+        put_line(console, label + _offset_line(made, offset, units.of_side(side)))
+        rows = [row for row in made.dead_zones if row.side == side]
+        title = f"Remaining dead zone (knee, share of command){f', {side} side' if label else ''}"
+        title += ": with the fixed setting, and with the law, which reads the pressures"
+        if any(row.law_end_L_min is not None for row in rows):
+            title += f"; flow on closing at {_transition_end(made, sign):.2%} of command, the end of the transition"
+        put_rows(console, title, rows, _export_columns(rows, units.of_side(side)))
+    for check in made.checks:
+        put_line(console, f"HOLDS  {check.name}: {check.text}")
+    for note in made.notes:
+        put_line(console, f"note: {note}")
+    put_units(console, units, "compensator.json")
+    put_line(console, f"SHA-256 of its compensator.json: {made.compensator_sha256}")
+
+
+def _offset_line(made: "AmplifierExport", offset: "FixedOffset", units: "RecordedUnits") -> str:
+    """Return what the largest safe offset is, what it lies under, and to what it was rounded."""
+    certificate = made.compensator.side(offset.sign).certificate
+    low, high = (float(end) for end in offset.dp_MPa)
+    set_to = made.setting.characteristics[offset.sign].offset
+    return (
+        f"largest fixed offset under the {100 * certificate.confidence:.6g}% lower bound of the {certificate.guard} "
+        f"threshold {units.span(low, high, '.2f MPa')}: {float(offset.share):.3%} of full drive (lowest at "
+        f"{units.text(float(offset.lowest_at_MPa), '.2f MPa')}); set: {float(set_to):.3%}"
+    )
+
+
+def _export_columns(rows: "Sequence[FixedDeadZone]", units: "RecordedUnits") -> "dict[str, Column[FixedDeadZone]]":
+    """Return the columns of the table: branches that no test recorded are left out, and so is a missing transition."""
+    columns: dict[str, Column[FixedDeadZone]] = {
+        f"dP ({units.label('MPa')})": lambda row: units.number(row.dp_MPa, ".2f MPa"),
+    }
+    for whose in ("fixed", "law"):
+        for branch in (each for each in BRANCHES if any(each in row.fixed for row in rows)):
+            columns[f"{whose}: {branch}"] = partial(_share, whose=whose, branch=branch)
+    if any(row.law_end_L_min is not None for row in rows):
+        for whose in ("fixed", "law"):
+            columns[f"{whose}: flow ({units.label('L/min')})"] = partial(_flow, whose=whose, units=units)
+    return columns
+
+
+def _transition_end(made: "AmplifierExport", sign: int) -> float:
+    """Return the command at which the transition ends, as a share of full command."""
+    compensator = made.compensator
+    return float(compensator.transition_end / compensator.signals.command.span(sign))
+
+
+def _share(row: "FixedDeadZone", whose: str, branch: str) -> str:
+    share = (row.fixed if whose == "fixed" else row.law).get(branch)
+    return "-" if share is None else "never" if isinf(share) else f"{share:.2%}"
+
+
+def _flow(row: "FixedDeadZone", whose: str, units: "RecordedUnits") -> str:
+    flow = row.fixed_end_L_min if whose == "fixed" else row.law_end_L_min
+    return "-" if flow is None else units.number(flow, ".2f L/min")
+
+
+#: Nodes of beta that are printed, of up to 127; --json has all.
+NODES_SHOWN = 12
+
+
+def print_calibration(found: "ReadCalibration", console: "Console | None" = None) -> None:
+    """Print a block in the recordings' units where they are known, else in V and MPa."""
+    console = console or new_console()
+    reading, units = found.reading, found.units
+    put_line(console, f"Serial number: {reading.serial or 'none'}; record: {reading.record or 'none'}")
+    put_line(console, f"Belongs to the compensator.json with the SHA-256 {reading.compensator_sha256}")
+    if found.belongs is not None:
+        which = "Is the block" if found.belongs else "IS NOT THE BLOCK"
+        why = f": {found.difference}" if found.difference else ""
+        put_line(console, f"{which} of {found.compared_with}{why}")
+    put_line(console, f"Layout {reading.layout}, {reading.length_words} words, CRC-32 {reading.crc32}")
+    if found.placed:
+        put_line(console, f"The file places it at {found.placed}")
+    kind = "; ".join(reading.shape) or "one solenoid, duty as output"
+    put_line(
+        console,
+        f"For firmware with: {kind}; codes 0 to {reading.code_max}, {reading.compare_max} counts at full drive, "
+        f"{reading.sample_Hz} samples and {reading.tick_Hz} PWM periods per second",
+    )
+    _put_signals(console, reading, units)
+    _put_drive(console, reading.drive, units)
+    for name, side in reading.sides.items():
+        _put_side(console, name, side, units.of_side(name))
+    if reading.current is not None:
+        integers = {name: number for name, number in reading.current.items() if name != "supply"}
+        words = ", ".join(f"{name} {number}" for name, number in integers.items())
+        put_line(console, f"Current controller, in its integers: {words}")
+    if units.in_words():
+        put_line(console, f"units: {units.in_words()}, those of the recordings; the block holds codes and counts")
+
+
+def _put_signals(console: "Console", reading: "CalibrationReading", units: "RecordedUnits") -> None:
+    command = reading.command
+    codes = ", ".join(f"{codes} codes to full {name} command" for name, codes in command.codes.items())
+    put_line(
+        console,
+        f"Command: zero at code {command.zero_code}, {codes}, {units.text(reading.u_max_V, 'g V')}; "
+        f"valid {_range(command.valid_codes)}",
+    )
+    sensors: dict[str, SensorReading] = {"A": reading.pressure_a, "B": reading.pressure_b}
+    for name, sensor in sensors.items():
+        put_line(
+            console,
+            f"Pressure {name}: 0 at code {sensor.zero_code}, {units.text(sensor.span_MPa, '.4g MPa')} at code "
+            f"{sensor.full_code}; valid {_range(sensor.valid_codes)}",
+        )
+    put_line(console, f"A pressure drop below {units.text(-reading.reverse_MPa, '.3f MPa')} is a failed sensor")
+
+
+def _range(codes: tuple[int, int]) -> str:
+    return f"from {codes[0]} to {codes[1]}"
+
+
+def _put_drive(console: "Console", drive: "DriveReading", units: "RecordedUnits") -> None:
+    def command(value_V: float) -> str:
+        return units.text(value_V, ".3f dV")
+
+    waits = "none" if drive.interlock_V is None else f"up to {command(drive.interlock_V)} is zero command"
+    dither = f"{command(drive.dither_V)} at {drive.dither_Hz:.4g} Hz" if drive.dither_Hz else "none"
+    play = f"travel {command(drive.play_travel_V)}, noise {command(drive.play_noise_V)}"
+    lines = {
+        "Largest output": command(drive.output_max_V),
+        "Zero band": command(drive.zero_band_V),
+        "Transition": command(drive.transition_V) if drive.transition_V else "none",
+        "Leaves rest beyond": command(drive.leave_zero_V),
+        "Interlock": waits,
+        "Fault": f"ends after {drive.fault_samples} valid samples{', latched' if drive.fault_latch else ''}",
+        "Dither": dither,
+        "Inverse play": play if drive.play_travel_V else "none",
+    }
+    for name, text in lines.items():
+        put_line(console, f"{name}: {text}")
+
+
+def _put_side(console: "Console", name: str, side: "SideReading", units: "RecordedUnits") -> None:
+    nodes, label = side.nodes, units.label("dV")
+    places = {round(place * (len(nodes) - 1) / (NODES_SHOWN - 1)) for place in range(NODES_SHOWN)}
+    columns: dict[str, Column[NodeReading]] = {
+        f"dP ({units.label('MPa')})": lambda node: units.number(node.dp_MPa, ".3f MPa"),
+        "beta": lambda node: f"{node.beta:.4f}",
+        "beta at zero command": lambda node: f"{node.beta_at_zero:.4f}",
+        f"output just above zero ({label})": lambda node: units.number(node.offset_V, ".3f dV"),
+        f"at full command ({label})": lambda node: units.number(node.full_V, ".3f dV"),
+    }
+    title = f"Law of {name} commands, at {len(places)} of {len(nodes)} nodes"
+    put_rows(console, title, [nodes[place] for place in sorted(places)], columns, words=())
+    ramps = (
+        f"{way} {seconds:.3g} s" for way, seconds in (("up", side.ramp_up_s), ("down", side.ramp_down_s)) if seconds
+    )
+    put_line(
+        console,
+        f"Tested to {units.text(side.tested_to_MPa, '.3f MPa')}; ramps: {', '.join(ramps) or 'none'}; inverse play: "
+        f"{units.text(side.play_V, '.3f dV') if side.play_V else 'none'}",
+    )
+
 
 #: Digits of a hash that tell two outputs apart.
 SHORT = 12

@@ -4,7 +4,7 @@ import os
 import sys
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Literal, TypeVar
 
 from dzdesign.core.documents import to_json
 from dzdesign.core.errors import one_line
@@ -13,11 +13,19 @@ if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions
     from rich.segment import Segment
 
+    from dzdesign.report.page import Table as PageTable
+
 Row = TypeVar("Row")
+#: What makes the cell of a result.
+Column = Callable[[Row], str]
 #: Columns of a page when stdout is a file or a pipe, and COLUMNS does not say.
 FILE_WIDTH = 140
 #: Blanks between the columns of a table, where there is room and where there is none; one more stands at its left.
 WIDE_GAP, NARROW_GAP = 3, 1
+#: Characters of a word, such as a file's name, that is not broken in a table.
+LONGEST_WORD = 20
+#: Kinds of a cell of the report that are words.
+WORDS = ("text", "finding", "good", "bad", "open")
 
 
 def new_console() -> "Console":
@@ -47,18 +55,20 @@ def put_line(console: "Console", text: str) -> None:
     console.print(text, markup=False, soft_wrap=True)
 
 
+def say_results(*lines: str) -> None:
+    """Print sentences on stdout, see `put_line`."""
+    console = new_console()
+    for line in lines:
+        put_line(console, line)
+
+
 def put_table(console: "Console", table: "Table") -> None:
-    """Print a table: one that is wider than the page is not cut."""
+    """Print a table."""
     console.print(table, crop=False)
 
 
-def volts(value: float | None) -> str:
-    """Return a voltage for a cell."""
-    return "-" if value is None else f"{value:.3f}"
-
-
 def put_rows(
-    console: "Console", title: str, rows: Iterable[Row], columns: Mapping[str, Callable[[Row], str]],
+    console: "Console", title: str, rows: Iterable[Row], columns: Mapping[str, Column[Row]],
     words: Sequence[int] = (0,),
 ) -> None:  # fmt: skip
     """Print results as a table: each column is its header and what makes the cell of a result; `words` as for Table."""
@@ -68,10 +78,22 @@ def put_rows(
     put_table(console, table)
 
 
-class Table:
-    """A table that rich prints: headers and words are wrapped at blanks; one that is still too wide is not cut.
+def put_facts(console: "Console", *tables: "PageTable | None") -> None:
+    """Print tables of the report."""
+    for table in filter(None, tables):
+        words = [at for at in range(len(table.columns)) if all(row[at].kind in WORDS for row in table.rows)]
+        printed = Table(table.caption, *table.columns, words=words)
+        for row in table.rows:
+            printed.add_row(*(f"{cell.text} ({cell.more})" if cell.more else cell.text for cell in row))
+        put_table(console, printed)
+        for note in table.notes:
+            put_line(console, note)
 
-    `words` are the columns of words; the others hold numbers, which are not wrapped.
+
+class Table:
+    """A table that rich prints: headers and words are wrapped at blanks, a number is not.
+
+    `words` are the columns of words. One that is too wide for the page goes on below, under its first column.
     """
 
     def __init__(self, title: str, *headers: str, words: Sequence[int] = (0,)) -> None:
@@ -85,16 +107,34 @@ class Table:
     def _least(self, column: int) -> int:
         """Return the longest word of a column's header and of its words, or its longest number."""
         cells = [row[column] for row in self.rows]
-        unbroken = [word for cell in cells for word in cell.split()] if column in self.words else cells
-        return max((len(word) for word in (*self.headers[column].split(), *unbroken)), default=0)
+        if column not in self.words:
+            return max((len(word) for word in (*self.headers[column].split(), *cells)), default=0)
+        words = [word for cell in (self.headers[column], *cells) for word in cell.split()]
+        return min(max(map(len, words), default=0), LONGEST_WORD)
 
-    def _widths(self, room: int) -> list[int]:
+    def _wanted(self, column: int) -> int:
+        """Return the width of a column without a wrapped line."""
+        return max(map(len, (self.headers[column], *(row[column] for row in self.rows))))
+
+    def _parts(self, width: int) -> list[list[int]]:
+        """Return the columns that fit side by side, all of them if they can; the first stands in each part."""
+        parts: list[list[int]] = [[0]]
+        for column in range(1, len(self.headers)):
+            together = [*parts[-1], column]
+            if len(parts[-1]) > 1 and 1 + sum(self._least(each) + NARROW_GAP for each in together) > width:
+                parts.append([0, column])
+            else:
+                parts[-1] = together
+        return parts
+
+    def _widths(self, columns: Sequence[int], room: int) -> list[int]:
         """Return a width for each column: what can't be broken, and of the room that is left words before headers."""
-        widths = [self._least(column) for column in range(len(self.headers))]
-        for column in sorted(range(len(widths)), key=lambda column: column not in self.words):
-            wanted = max(map(len, (self.headers[column], *(row[column] for row in self.rows))))
-            widths[column] += max(0, min(wanted - widths[column], room - sum(widths)))
-        return widths
+        widths = {column: self._least(column) for column in columns}
+        for column in sorted(columns, key=lambda column: column not in self.words):
+            widths[column] += max(0, min(self._wanted(column) - widths[column], room - sum(widths.values())))
+        widest = max(columns, key=lambda column: (column in self.words, widths[column]))
+        widths[widest] = max(1, widths[widest] - max(0, sum(widths.values()) - room))  # a path longer than the page
+        return list(widths.values())
 
     def __rich_console__(self, console: "Console", options: "ConsoleOptions") -> "Iterator[Segment]":
         """Yield the lines, without the blanks to which rich fills each up."""
@@ -103,21 +143,22 @@ class Table:
         from rich.segment import Segment
         from rich.text import Text
 
-        least = sum(map(self._least, range(len(self.headers))))
-        gap = WIDE_GAP if least + WIDE_GAP * len(self.headers) < options.max_width else NARROW_GAP
-        widths = self._widths(options.max_width - 1 - gap * len(self.headers))
-        table = rich_table.Table(
-            title=Text(self.title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD,
-            padding=(0, gap // 2), collapse_padding=False,
-        )  # fmt: skip
-        for column, (header, width) in enumerate(zip(self.headers, widths, strict=True)):
-            table.add_column(Text(header), justify="left" if column in self.words else "right", width=width)
-        for row in self.rows:
-            table.add_row(*map(Text, row))
-        wide = max(options.max_width, 1 + sum(widths) + gap * len(widths))
-        for line in console.render_lines(table, options.update(width=wide), pad=False):
-            while line and not line[-1].text.strip():
-                line.pop()
-            yield from line[:-1]
-            yield from [Segment(line[-1].text.rstrip(), line[-1].style)] if line else []
-            yield Segment.line()
+        for columns in self._parts(options.max_width):
+            unwrapped = sum((self._wanted if each in self.words else self._least)(each) for each in columns)
+            gap = WIDE_GAP if unwrapped + WIDE_GAP * len(columns) < options.max_width else NARROW_GAP
+            widths = self._widths(columns, options.max_width - 1 - gap * len(columns))
+            table = rich_table.Table(
+                title=Text(self.title) if columns[1:2] in ([], [1]) else None, title_justify="left", title_style="bold",
+                box=box.SIMPLE_HEAD, padding=(0, gap // 2), collapse_padding=False,
+            )  # fmt: skip
+            for column, width in zip(columns, widths, strict=True):
+                justify: Literal["left", "right"] = "left" if column in self.words else "right"
+                table.add_column(Text(self.headers[column]), justify=justify, width=width, overflow="fold")
+            for row in self.rows:
+                table.add_row(*(Text(row[column]) for column in columns))
+            for line in console.render_lines(table, options, pad=False):
+                while line and not line[-1].text.strip():
+                    line.pop()
+                yield from line[:-1]
+                yield from [Segment(line[-1].text.rstrip(), line[-1].style)] if line else []
+                yield Segment.line()

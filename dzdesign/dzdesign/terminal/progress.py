@@ -1,4 +1,4 @@
-"""Progress on stderr: stages, bars after a second, and as much of a log as was asked for."""
+"""Progress on stderr: stages, bars, and as much of a log as was asked for."""
 
 import contextlib
 import os
@@ -10,12 +10,7 @@ from typing import TYPE_CHECKING, TextIO, TypeVar
 from dzdesign.core.errors import clear_line
 
 if TYPE_CHECKING:
-    import threading
-
     from rich.progress import Progress
-
-#: Work that is done sooner shows no bar, s.
-PATIENCE = 1.0
 
 T = TypeVar("T")
 
@@ -89,7 +84,7 @@ def is_watched() -> bool:
 
 @contextlib.contextmanager
 def stage_progress(first: str = "") -> Iterator["StageProgress"]:
-    """Give a `say` after which, once a stage has taken `PATIENCE`, a bar moves until the next stage, with the time.
+    """Give a `say` after which a bar moves until the next stage, with the time.
 
     The `first` stage, if it is named, begins at once.
     """
@@ -106,58 +101,41 @@ class StageProgress:
     """A `say` for the stages of long work; rich moves the bar by a thread, as the work may be one call of C."""
 
     def __init__(self) -> None:
-        self._timer: threading.Timer | None = None
         self._bar: Progress | None = None
-        self._done = 0
-        self._total: int | None = None
 
     def __call__(self, text: str) -> None:
         """Begin a stage."""
         say(text)
         self.begin(text)
 
-    def begin(self, text: str) -> None:
+    def begin(self, text: str, total: int | None = None) -> None:
         """Begin a stage of which nothing is told but by its bar."""
         self.end()
         if is_watched():
-            import threading
+            from rich.console import Console
+            from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-            self._timer = threading.Timer(PATIENCE, self._show, [text])
-            self._timer.daemon = True
-            self._timer.start()
+            columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+            self._bar = Progress(*columns, console=Console(stderr=True), transient=True)
+            self._bar.add_task(text, total=total)
+            self._bar.start()
 
     def each(self, items: Iterable[T], total: int | None) -> Iterator[T]:
         """Return the items one by one: the bar of this stage knows its end then."""
-        self._total = total
-        for self._done, item in enumerate(items):
+        for done, item in enumerate(items):
             if self._bar is not None:
-                self._bar.update(self._bar.task_ids[0], total=total, completed=self._done)
+                self._bar.update(self._bar.task_ids[0], total=total, completed=done)
             yield item
 
     def end(self) -> None:
         """End the stage, if there is one: its bar is gone."""
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer.join()
         if self._bar is not None:
             self._bar.stop()
-        self._timer = self._bar = self._total = None
-        self._done = 0
-
-    def _show(self, text: str) -> None:
-        from rich.console import Console
-        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-        columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-        bar = Progress(*columns, console=Console(stderr=True), transient=True)
-        task = bar.add_task(text, total=self._total)
-        self._bar = bar
-        bar.update(task, total=self._total, completed=self._done)  # what `each` did before it saw the bar
-        bar.start()
+        self._bar = None
 
 
 def with_bar(items: Iterable[T], what: str, total: int | None = None) -> Iterator[T]:
-    """Return the items one by one, with a bar on stderr once that has taken `PATIENCE`; none if it is no terminal."""
+    """Return the items one by one, with a bar on stderr; none if it is no terminal."""
     with stage_progress() as stage:
         stage.begin(what)
         yield from stage.each(items, len(items) if isinstance(items, Sized) else total)

@@ -1,92 +1,55 @@
-"""The paper's numbers beside ours as tables on stdout: one a valve, then tolerances, reasons, parameters."""
+"""The paper's numbers beside ours as tables on stdout: one a valve, then reasons, assumptions and the count."""
 
 from typing import TYPE_CHECKING
 
-from dzdesign.terminal.page import Table, new_console, put_line, put_table
+from dzdesign.terminal.page import Column, new_console, put_line, put_rows
 
 if TYPE_CHECKING:
     from dzdesign.reproduce.artefact import PaperNumber, Reproduction
-
 
 AGREES, MISSED, UNEXPLAINED = "agrees", "MISSED", "MISSED, NOBODY KNOWS WHY"
 
 
 def print_reproduction(reproduction: "Reproduction") -> None:
-    """Print the paper's numbers beside ours, valve by valve, the reasons, and the parameters that were recovered."""
+    """Print the paper's numbers beside ours, valve by valve, and the reasons."""
     console = new_console()
-    tolerances: dict[str, str] = {}
     notes: dict[str, int] = {}
-    numbers = reproduction.numbers
-    for name in dict.fromkeys(number.valve for number in numbers):
-        table = Table(
-            f"The paper's numbers and ours, without / with hysteresis: {name}", "", "MPa", "published", "", "within",
-            "valve", "paper's law", "product", "", "why",
-        )  # fmt: skip
-        for item in numbers:
-            if item.valve == name:
-                letter = ""
-                if item.tolerance:
-                    letter = tolerances.setdefault(item.tolerance, chr(ord("a") + len(tolerances)))
-                texts = dict.fromkeys([*(one.reason for one in item.outcomes), item.why])
-                places = [f"[{notes.setdefault(text, len(notes) + 1)}]" for text in texts if text]
-                table.add_row(*_cells(item, letter), "".join(places))
-        put_table(console, table)
-    for tolerance, letter in tolerances.items():
-        put_line(console, f"({letter}) {tolerance}")
+
+    def verdict(item: "PaperNumber") -> str:
+        texts = filter(None, (item.reason, item.why))
+        return f"{verdict_of(item)} {''.join(f'[{notes.setdefault(each, len(notes) + 1)}]' for each in texts)}".strip()
+
+    columns: dict[str, Column[PaperNumber]] = {
+        "": lambda item: item.quantity,
+        "MPa": lambda item: "" if item.dp_MPa is None else f"{item.dp_MPa:g}",
+        "paper": with_unit,
+        "ours": lambda item: f"{item.value:.2f}",
+        "of": lambda item: item.by,
+        "ideal line": lambda item: "" if item.ideal_line is None else f"{item.ideal_line:.2f}",
+        "verdict": verdict,
+    }
+    for valve in reproduction.valves:
+        of_valve = [item for item in reproduction.numbers if item.valve == valve.valve]
+        read = f"; dead zones read at {valve.level_L_min:g} L/min" if valve.level_L_min else ""
+        put_rows(console, f"The paper's numbers and ours: {valve.valve}{read}", of_valve, columns, words=(0, 4, 6))
     for note, number in notes.items():
         put_line(console, f"[{number}] {note}")
-    put_line(console, "Assumed, as the paper does not say it:")
-    for assumption in reproduction.assumptions:
-        put_line(console, f"- {assumption}")
-    for valve in reproduction.valves:
-        if not valve.hysteresis_V:
-            recovered = ", ".join(f"{name} {each.value:g}" for name, each in valve.parameters.items() if each.recovered)
-            put_line(console, f"{valve.valve}, recovered parameters: {recovered}")
+    put_line(console, f"Assumed, as the paper does not say it: {'; '.join(reproduction.assumptions)}")
     for line in summary(reproduction):
         put_line(console, line)
 
 
 def summary(reproduction: "Reproduction") -> list[str]:
-    """Return how many numbers are of which kind, and how many of the predicted ones agree, in all and of whom."""
+    """Return how many numbers are of which kind, and how many of the predicted ones agree."""
     numbers = reproduction.numbers
-    predicted = [item for item in numbers if item.kind == "predicted"]
-    agree = sum(item.agrees is True for item in predicted)
+    predicted = [item.agrees for item in numbers if item.kind == "predicted"]
     kinds = {kind: sum(item.kind == kind for item in numbers) for kind in ("fitted", "predicted", "given", "in words")}
-    lines = [
-        f"{len(numbers)} numbers: " + ", ".join(f"{count} {kind}" for kind, count in kinds.items()) + ".",
-        f"Of {len(predicted)} predicted {agree} agree and {len(predicted) - agree} are missed.",
-    ]
-    for by in ("valve", "paper's law", "product"):
-        counts = []
-        for with_hysteresis in (False, True):
-            compared = [
-                one.agrees
-                for item in predicted
-                for one in item.outcomes
-                if one.by == by and one.agrees is not None and (one.hysteresis_V > 0) == with_hysteresis
-            ]
-            counts.append(f"{sum(compared)} of {len(compared)}")
-        lines.append(f"{by}: {counts[0]} agree, with the assumed hysteresis {counts[1]}")
     unknown = sum(item.holds is False for item in numbers)
-    lines.append(f"{unknown} MISSED FOR NO REASON THAT REACHES SO FAR." if unknown else "Every miss has its reason.")
-    return lines
-
-
-def _cells(item: "PaperNumber", letter: str) -> tuple[str, ...]:
-    """Return the cells of one number: ours without / with hysteresis where these differ; one that misses is marked."""
-    ours: dict[str, list[str]] = {}
-    for outcome in item.outcomes:
-        text = "not compared" if outcome.value is None else f"{outcome.value:.2f}"
-        ours.setdefault(outcome.by, []).append(text + ("!" if outcome.agrees is False else ""))
-    return (
-        item.quantity,
-        "" if item.dp_MPa is None else f"{item.dp_MPa:g}",
-        with_unit(item),
-        item.kind,
-        f"({letter})" if letter else "",
-        *(" / ".join(dict.fromkeys(ours.get(by, ()))) for by in ("valve", "paper's law", "product")),
-        verdict_of(item),
-    )
+    return [
+        f"{len(numbers)} numbers: " + ", ".join(f"{count} {kind}" for kind, count in kinds.items()) + ".",
+        f"Of {len(predicted)} predicted {predicted.count(True)} agree and {predicted.count(False)} are missed.",
+        f"{unknown} MISSED FOR NO REASON THAT REACHES SO FAR." if unknown else "Every miss has its reason.",
+    ]
 
 
 def with_unit(item: "PaperNumber") -> str:
@@ -99,5 +62,5 @@ def verdict_of(item: "PaperNumber") -> str:
     if item.holds is False:
         return UNEXPLAINED
     if item.kind != "predicted":
-        return ""
+        return item.kind
     return AGREES if item.agrees else MISSED

@@ -8,18 +8,16 @@ from typing import TYPE_CHECKING
 
 from dzdesign.core.artefact_files import MANIFEST_NAME
 from dzdesign.core.units import chance
-from dzdesign.terminal.page import new_console, put_line, put_rows
+from dzdesign.terminal.page import Column, new_console, put_line, put_rows
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-    from fractions import Fraction
+    from collections.abc import Sequence
 
     from rich.console import Console
 
     from dzdesign.codegen.other_targets import Output
     from dzdesign.codegen.project import Firmware
     from dzdesign.core.recorded_units import RecordedUnits
-    from dzdesign.design.compensator import Compensator
     from dzdesign.identify.valve.model import ValveModel
     from dzdesign.identify.valve.ramp_result import TestResult
     from dzdesign.identify.valve.side_model import SideModel
@@ -28,10 +26,6 @@ if TYPE_CHECKING:
 NAMED_FILES, LONGEST_DIFFERENCE = 6, 12
 #: Pressure drops over which a distance is averaged.
 GRID = 101
-
-
-def _rational(value: "Fraction") -> str:
-    return f"{value} = {float(value):.5f}"
 
 
 def print_valve(valve: "ValveModel", console: "Console | None" = None) -> None:
@@ -104,7 +98,7 @@ def _put_thresholds(console: "Console", side: "SideModel", title: str, units: "R
         return "-" if value is None else units.number(value, ".3f V")
 
     betas = dict(zip((test.source for test in side.tests), side.beta.beta, strict=False))  # none without a known dP
-    columns: dict[str, Callable[[TestResult], str]] = {
+    columns: dict[str, Column[TestResult]] = {
         "ramp test": lambda test: short_source(test.source, test.ramps),
         f"dP ({units.label('MPa')})": lambda test: "?" if test.dp_MPa is None else units.number(test.dp_MPa, ".3f MPa"),
         "knee opening": lambda test: command(test.u_knee_rising_V),
@@ -249,62 +243,6 @@ def _premise_lines(side: "SideModel") -> tuple[str, ...]:
         words.append(f"{check.premise} {leaves} ({tested})")
     what = "predicted opening dead zone without a transition, largest over the tested pressure range, for each premise"
     return (f"{what} (--curve): {', '.join(words)}. `design` states the exact values; a transition reduces them",)
-
-
-def _tables(compensator: "Compensator", nodes: int) -> str:
-    """Say how many tables of beta there are: the line and the offset have one each where a transition parts them."""
-    if compensator.transition_codes:
-        return f"beta tables: {nodes} nodes each, for the line and for the offset"
-    return f"beta table: {nodes} nodes"
-
-
-def print_compensator(compensator: "Compensator", console: "Console | None" = None) -> None:
-    """Print the law, the certificate, what the choices cost and where it ends."""
-    from dzdesign.derivation.law import law
-    from dzdesign.design.costs import design_warnings, lines_of_tests
-    from dzdesign.design.pressure_inputs import signals_in_words
-    from dzdesign.design.signals import SIDE_NAMES
-    from dzdesign.terminal.budget_table import print_budgets
-    from dzdesign.terminal.cost_table import print_costs_at_tests
-
-    chosen, units = law(compensator.law), compensator.valve.recorded_units
-    lines = [
-        f"law: '{chosen.name}', Eq. {chosen.equation}: output u_O = {chosen.output}, at command u_i",
-        *signals_in_words(compensator),
-    ]
-    for sign in compensator.signals.signs:
-        side = compensator.side(sign)
-        certificate = side.certificate
-        low, high = (float(end) for end in certificate.dp_MPa)
-        label = "" if compensator.negative is None else "positive: " if sign > 0 else "negative: "
-        lines += [
-            f"{label}the law's line: u_min0/u_max = {_rational(side.u_min0_over_u_max)} at dP0 ({side.start}), drive "
-            f"range of the law k x_max/u_max = {_rational(side.drive_range_over_u_max)} (from there to full output)",
-            f"{label}{_tables(compensator, len(side.beta))}, linear between them, "
-            f"resolution 1/{compensator.beta_denominator}",
-            f"{label}certificate (covers {compensator.certified_of}): the offset stays below the "
-            f"{100 * certificate.confidence:.6g}% lower bound of the {certificate.guard} threshold "
-            f"{units.span(low, high, '.3f MPa')}, at every pressure code; "
-            + (
-                compensator.valve.sides[SIDE_NAMES[sign]].none_in_words(certificate.guard, units)
-                if certificate.zero_flow_L_min is None
-                else compensator.valve.sides[SIDE_NAMES[sign]].zero_flow_in_words(units)
-            ),
-            f"{label}{compensator.valve.sides[SIDE_NAMES[sign]].between_in_words(certificate.guard)}",
-        ]
-    if compensator.current_drive is not None:
-        lines += compensator.current_drive.in_words(units)
-    warnings = design_warnings(compensator)
-    elsewhere = {*warnings, *(line for sign in compensator.signals.signs for line in lines_of_tests(compensator, sign))}
-    console = console or new_console()
-    for line in (*(f"warning: {line}" for line in warnings), *lines):
-        put_line(console, line)
-    print_costs_at_tests(compensator, console)
-    if compensator.machine is not None:
-        print_budgets(compensator, console)
-    for line in compensator.costs:
-        if line not in elsewhere:
-            put_line(console, f"note: {line}")
 
 
 def print_firmware(firmware: "Firmware", console: "Console | None" = None, folder: str = "") -> None:

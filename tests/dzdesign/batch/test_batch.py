@@ -20,8 +20,8 @@ import pytest
 
 from dzdesign.batch.calibration import Task
 from dzdesign.batch.command import useful_jobs
-from dzdesign.batch.results import Results
 from dzdesign.batch.runners import run_local
+from dzdesign.batch.valve_folders import Results
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.documents import sha256_of

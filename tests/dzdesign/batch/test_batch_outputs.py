@@ -12,7 +12,8 @@ import pytest
 from dzdesign.batch import outputs as outputs_module
 from dzdesign.batch.arguments import BatchArguments
 from dzdesign.batch.calibration import Task, calibrate
-from dzdesign.batch.outputs import ForOutputs, WantedOutput, lot_outputs, make_output, may_end_otherwise, wanted_outputs
+from dzdesign.batch.outputs import ForOutputs, WantedOutput, make_output, may_end_otherwise, wanted_outputs
+from dzdesign.batch.summary import lot_outputs
 from dzdesign.batch.valve_folders import ValveFolder
 from dzdesign.codegen import other_targets
 from dzdesign.command_line.cli import main

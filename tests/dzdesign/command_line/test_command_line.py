@@ -20,11 +20,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.console import Console
 
-from dzdesign import initial_options
+from dzdesign import stages
 from dzdesign.command_line.cli import main
-from dzdesign.command_line.command_table import COMMANDS, EXAMPLES
 from dzdesign.command_line.invocation import parse
-from dzdesign.command_line.parser import arguments_of_command, command_module
+from dzdesign.command_line.parser import COMMANDS, EXAMPLES, arguments_of_command, command_module
 from dzdesign.core.errors import InputError, nearest, neighbour
 from dzdesign.core.options import GROUPS, Option
 from dzdesign.core.units import si_factor
@@ -198,7 +197,6 @@ class Terminal(io.StringIO):
 def test_a_long_stage_moves_a_bar_for_a_person(monkeypatch, stream, quiet, term, shown):
     page = stream()
     monkeypatch.setattr(sys, "stderr", page)
-    monkeypatch.setattr(progress, "PATIENCE", 0.01)
     monkeypatch.setenv("TERM", term)
     with progress.reporting(quiet=quiet, verbose=False), progress.stage_progress() as stage:
         stage("fitting")
@@ -214,7 +212,6 @@ def test_a_long_stage_moves_a_bar_for_a_person(monkeypatch, stream, quiet, term,
 def test_a_stage_of_known_pieces_shows_how_far_it_is(monkeypatch):
     page = Terminal()
     monkeypatch.setattr(sys, "stderr", page)
-    monkeypatch.setattr(progress, "PATIENCE", 0.0)
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.delenv("NO_COLOR", raising=False)
 
@@ -259,6 +256,9 @@ def test_colour_is_for_terminals_and_for_who_asks(monkeypatch):
     [
         ("idntify a.csv", "there is no command 'idntify' (did you mean 'identify'?)"),
         ("identify a.csv --meterlag '0.1 s'", "has no option --meterlag (did you mean '--meter-lag'?)"),
+        ("identify --bogus", "`dzdesign identify` has no option --bogus"),
+        ("load --bogus --port COM1", "`dzdesign load` has no option --bogus"),
+        ("--bogus", "`dzdesign` has no option --bogus"),
         ("identify a.csv --guard mean", "(it is an option of `dzdesign design`, `codegen`, `batch`)"),
         ("design valve.json --meter-lag 1s", "(it is an option of `dzdesign identify`, `batch`, `assess`)"),
         ("verify firmware more", "'more' is one word too many"),
@@ -285,7 +285,7 @@ def test_a_near_miss_is_named(line, hint, ramp_file, tmp_path, monkeypatch, caps
 
 
 def test_what_init_proposes_for_the_record_is_no_mistake(tmp_path, capsys):
-    file, templates = tmp_path / "dz.toml", Path(initial_options.__file__).parent / "templates"
+    file, templates = tmp_path / "dz.toml", Path(stages.__file__).parent / "templates"
     entries = (templates / "dzdesign.toml.jinja").read_text(encoding="utf-8").partition("# [record]\n")[2]
     file.write_text("[record]\n" + entries.replace("# ", ""), encoding="utf-8")
     assert {"serial", "oil"} <= parse(["identify", "a.csv", "--config", str(file)]).arguments.record.keys()
@@ -367,14 +367,25 @@ def test_a_table_fits_the_page_with_every_word_whole(columns, rows, width, data)
         assert all(word in shown for word in cell.split())
 
 
-def test_a_table_too_wide_is_not_cut():
+def test_a_table_too_wide_goes_on_below_under_its_first_column():
     table = Table("t", "ramp test", *(f"number{k}" for k in range(12)))
     table.add_row("ramp_dP0.5.csv.gz", *(f"{k}.12345" for k in range(12)))
     page = Console(width=80, file=io.StringIO(), highlight=False)
     put_table(page, table)
     text = page.file.getvalue()
     assert [text.count(f" {k}.12345") for k in range(12)] == [1] * 12
-    assert "…" not in text and len([line for line in text.splitlines() if "12345" in line]) == 1
+    rows = [line for line in text.splitlines() if "12345" in line]
+    assert len(rows) == 2 and all("ramp_dP0.5.csv.gz" in row for row in rows)
+    assert "…" not in text and max(map(len, text.splitlines())) <= 80 and text.count("t\n") == 1
+
+
+def test_a_name_longer_than_the_page_is_broken():
+    table = Table("t", "file", "number")
+    table.add_row("a" * 100, "1.5")
+    page = Console(width=80, file=io.StringIO(), highlight=False)
+    put_table(page, table)
+    text = page.file.getvalue()
+    assert max(map(len, text.splitlines())) <= 80 and text.count("a") == 100 and "1.5" in text
 
 
 def test_markup_in_a_cell_is_text():

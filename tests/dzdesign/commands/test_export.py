@@ -16,7 +16,7 @@ from dzdesign.core.documents import sha256_of
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import PressureUnit, RecordedUnits
 from dzdesign.design.compensator import Compensator
-from dzdesign.terminal.export_tables import print_export
+from dzdesign.terminal.output_tables import print_export
 from tests.support.paths import GOLDENS
 
 #: Without the proof of the compensator's numbers, which takes a second.

@@ -1,4 +1,4 @@
-"""The bar: on a terminal, after a while, on stderr, and gone afterwards; nothing anywhere else."""
+"""The bar: on a terminal, on stderr, and gone afterwards; nothing anywhere else."""
 
 import io
 import sys
@@ -22,12 +22,12 @@ def until_seen(stream, text):
 
 
 @pytest.mark.parametrize(
-    ("terminal", "patience_s", "seen"), [(True, 0.0, True), (True, 60, False), (False, 0.0, False)]
+    ("terminal", "quiet", "seen"), [(True, False, True), (True, True, False), (False, False, False)]
 )
-def test_a_bar_only_for_a_person_who_waits(monkeypatch, terminal, patience_s, seen):
+def test_a_bar_only_for_a_person_who_watches(monkeypatch, terminal, quiet, seen):
     stream = Terminal() if terminal else io.StringIO()
     monkeypatch.setattr(sys, "stderr", stream)
-    monkeypatch.setattr(progress, "PATIENCE", patience_s)
+    monkeypatch.setattr(progress._Verbosity, "quiet", quiet)
     monkeypatch.setenv("TERM", "xterm")
     items = []
     for item in with_bar(range(9), "reading ramp tests"):
@@ -42,7 +42,6 @@ def test_a_bar_only_for_a_person_who_waits(monkeypatch, terminal, patience_s, se
 def test_the_bar_is_gone_when_the_work_fails(monkeypatch):
     stream = Terminal()
     monkeypatch.setattr(sys, "stderr", stream)
-    monkeypatch.setattr(progress, "PATIENCE", 0.0)
     monkeypatch.setenv("TERM", "xterm")
 
     def work():

@@ -1,19 +1,26 @@
 """Tables of results on a terminal: rows that fit, and what they say."""
 
+import io
 import re
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from rich.console import Console
 
+from dzdesign.codegen.project import target_named
 from dzdesign.core.artefact_types import THIS_TOOL
 from dzdesign.core.recorded_units import AS_COMPUTED
+from dzdesign.design.designing import design
+from dzdesign.design.options import options_of
 from dzdesign.report.lot.summary import FailedValve, LotSummary
+from dzdesign.terminal.design_tables import print_compensator
 from dzdesign.terminal.page import new_console
-from dzdesign.terminal.tables import gains_most
-from dzdesign.terminal.verification_tables import print_scenarios
+from dzdesign.terminal.tables import gains_most, print_valve
+from dzdesign.terminal.verification_tables import print_loop
 from dzdesign.verify.loop_results import ScenarioResult
+from tests.support.evidence import pressure_result
 
 FIGURES = {
     "compensated_flow_L_min": 12.9, "compensated_rise_ms": 4.0, "compensated_settling_ms": 9.6,
@@ -29,11 +36,31 @@ def scenario(name, **figures):
     )  # fmt: skip
 
 
+def evidence_of(*scenarios):
+    """Evidence without ramps."""
+    return SimpleNamespace(closed_loop=SimpleNamespace(pressures=()), scenarios=scenarios)
+
+
+@pytest.mark.parametrize("both", [False, True])
+def test_no_line_is_wider_than_a_terminal_of_80_columns(example_valve, both):
+    """Seeded once: headers of long words made the closed loop's table 114 columns wide."""
+    result = pressure_result(unseen_below_L_min=0.63, q_max_direct_L_min=135.7, q_max_L_min=135.7)
+    evidence = evidence_of(scenario("sensor ahead shows full, or the one behind breaks", **FIGURES))
+    loop = SimpleNamespace(pressures=[result, *[replace(result, side="negative")] * both], back_MPa=(0.0, 1.0))
+    evidence.closed_loop = SimpleNamespace(**vars(loop), plant_source="a plant")
+    page = Console(width=80, force_terminal=True, file=io.StringIO(), highlight=False)
+    print_valve(example_valve, page)
+    print_compensator(design(example_valve, options_of({}, target_named("f28335").inputs())), page)
+    print_loop(evidence, page)
+    lines = re.sub(r"\x1b\[[0-9;]*m", "", page.file.getvalue()).splitlines()
+    assert len(lines) > 60 and max(map(len, lines)) <= 80
+
+
 @pytest.mark.parametrize("width", [80, 100, 140])
 def test_scenarios_are_a_table_of_short_rows_and_lines(monkeypatch, capsys, width):
     monkeypatch.setenv("COLUMNS", str(width))
     names = ("step to half command and back", "sensor ahead shows full, or the one behind breaks")
-    print_scenarios([scenario(names[0], **FIGURES), scenario(names[1])], new_console())
+    print_loop(evidence_of(scenario(names[0], **FIGURES), scenario(names[1])), new_console())
     table, _, lines = capsys.readouterr().out.partition(f"{names[0]}: ")
     rows = re.split("─{40,}", table)[1].splitlines()
     assert len([row for row in rows if row.strip()]) <= 3, "a row fills at most two lines"
@@ -45,13 +72,13 @@ def test_scenarios_are_a_table_of_short_rows_and_lines(monkeypatch, capsys, widt
 
 def test_a_flow_that_the_recordings_can_not_show_is_no_zero(capsys):
     hidden = replace(scenario("step", **FIGURES), unseen_below_L_min=0.63, q_peak_at_zero_L_min=0.7)
-    print_scenarios([hidden], new_console())
+    print_loop(evidence_of(hidden), new_console())
     out = capsys.readouterr().out
     assert re.search(r"5\.00 +1\.00 +below 0\.63 +0\.70", out) and "without it flow below 0.63 L/min" in out
 
 
 def test_the_headline_of_a_batch_counts_calibrated_valves(capsys):
-    from dzdesign.batch.printing import print_lot
+    from dzdesign.batch.printing import lines_of_lot, print_quantiles
 
     summary = LotSummary(
         tool=THIS_TOOL,
@@ -66,8 +93,8 @@ def test_the_headline_of_a_batch_counts_calibrated_valves(capsys):
         anomalies=("two share a recording",),
         warnings={"onset-hidden": ("V1", "V2", "V3", "V4"), "pressure-stuck": ("V3",)},
     )
-    print_lot(summary, Path("out"))
-    said = capsys.readouterr().out
+    print_quantiles(summary)
+    said = "\n".join([capsys.readouterr().out, *lines_of_lot(summary, Path("out"))])
     assert "3 calibrated valves of 4" in said and "odd: two share a recording" in said
     assert "warnings: pressure-stuck 1 (V3), onset-hidden 4" in said
 

@@ -9,7 +9,6 @@ from msgspec import Meta
 from dzdesign.core.artefact_files import MANIFEST_NAME
 from dzdesign.core.artefact_types import Artefact, RuleError, quantity
 from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
-from dzdesign.verify.loop_results import about
 
 #: File of a lot, finished or not; folder of a lot in which each valve has its own; a valve's firmware in that.
 SUMMARY_NAME, VALVES, FIRMWARE = "batch.json", "valves", "firmware"
@@ -46,46 +45,55 @@ NOT_MADE: Final = "not made"
 class Quantiles:
     """Quantiles over the valves, linear between the two nearest: the median of an even number is the mean of two."""
 
-    least: Annotated[Number, about("Minimum.")]
-    q05: Annotated[Number, about("5 % quantile.")]
-    median: Annotated[Number, about("Median.")]
-    q95: Annotated[Number, about("95 % quantile.")]
-    largest: Annotated[Number, about("Maximum.")]
+    least: Number
+    """Minimum."""
+    q05: Number
+    """5 % quantile."""
+    median: Number
+    """Median."""
+    q95: Number
+    """95 % quantile."""
+    largest: Number
+    """Maximum."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FailedValve:
     """A valve that is not calibrated."""
 
-    name: Annotated[str, about("Name of the valve.")]
-    status: Annotated[
-        Literal["failed", "does not hold"],
-        about("Whether the valve was not made, or a requirement of its verification does not hold."),
-    ]
-    reason: Annotated[str, about("Reason, in one sentence.")]
+    name: str
+    """Name of the valve."""
+    status: Literal["failed", "does not hold"]
+    """Whether the valve was not made, or a requirement of its verification does not hold."""
+    reason: str
+    """Reason, in one sentence."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UntestedPressures:
     """Pressure drops at which at least half of the lot was tested, but one side of this valve was not."""
 
-    name: Annotated[str, about("Name of the valve.")]
-    side: Annotated[Literal["positive", "negative"], about("Sign of the command.")]
-    dp_MPa: Annotated[tuple[Pressure, ...], quantity("MPa", "Pressure drops at which the valve was not tested.")]
+    name: str
+    """Name of the valve."""
+    side: Literal["positive", "negative"]
+    """Sign of the command."""
+    dp_MPa: Annotated[tuple[Pressure, ...], quantity("MPa")]
+    """Pressure drops at which the valve was not tested."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SmallestMargin:
     """Proof that the lot setting lies below the bounds of every valve, at every code of the valve's tested interval."""
 
-    valves: Annotated[int, Meta(description="Number of valves compared.", ge=2, le=10**9)]
-    worst: Annotated[str, about("Name of the valve with the smallest margin.")]
-    dp_MPa: Annotated[Pressure, quantity("MPa", "Pressure drop at which that valve has the smallest margin.")]
-    smallest_margin_V: Annotated[
-        Number,
-        quantity("V", "Smallest margin of the exact law below the valve's bound, with half a count reserved for "
-                 "rounding. The margin in `verify` refers to the rounded integers of the C code."),
-    ]  # fmt: skip
+    valves: Annotated[int, Meta(ge=2, le=10**9)]
+    """Number of valves compared."""
+    worst: str
+    """Name of the valve with the smallest margin."""
+    dp_MPa: Annotated[Pressure, quantity("MPa")]
+    """Pressure drop at which that valve has the smallest margin."""
+    smallest_margin_V: Annotated[Number, quantity("V")]
+    """Smallest margin of the exact law below the valve's bound, with half a count reserved for rounding. The margin
+    in `verify` refers to the rounded integers of the C code."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -114,16 +122,16 @@ class LotSettingSummary:
 class LotFirmware:
     """The common firmware of a lot whose valves have calibration blocks."""
 
-    folder: Annotated[
-        str, Meta(description="Folder of the firmware, beside this file.", pattern=r"^\w+/\w+$", max_length=100)
-    ]
-    target: Annotated[str, Meta(description="Microcontroller of the firmware.", max_length=100)]
-    manifest_sha256: Annotated[Sha256, about("SHA-256 of the firmware's manifest.json.")]
-    block_of: Annotated[
-        str,
-        about("Source of the calibration block until another is loaded: the lot setting, or the valve of this name."),
-    ]
-    blocks: Annotated[Names, about("Files with a valve's own block, in the valve's folder.")]
+    folder: Annotated[str, Meta(pattern=r"^\w+/\w+$", max_length=100)]
+    """Folder of the firmware, beside this file."""
+    target: Annotated[str, Meta(max_length=100)]
+    """Microcontroller of the firmware."""
+    manifest_sha256: Sha256
+    """SHA-256 of the firmware's manifest.json."""
+    block_of: str
+    """Source of the calibration block until another is loaded: the lot setting, or the valve of this name."""
+    blocks: Names
+    """Files with a valve's own block, in the valve's folder."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -131,14 +139,16 @@ class LotOutput:
     """One kind of output that was requested for each valve of a lot."""
 
     folder: FolderName
-    settings: Annotated[
-        Mapping[str, str],
-        about("Values of the `codegen` options that only this kind of output has, by name without hyphens."),
-    ]
-    holds: Annotated[Names, about("Valves whose output was verified, with every requirement met.")]
-    does_not_hold: Annotated[Names, about("Valves whose output was verified, with a requirement not met.")]
-    not_verified: Annotated[Names, about("Valves whose output was made but not verified.")]
-    not_made: Annotated[Names, about("Valves whose output could not be made.")]
+    settings: Mapping[str, str]
+    """Values of the `codegen` options that only this kind of output has, by name without hyphens."""
+    holds: Names
+    """Valves whose output was verified, with every requirement met."""
+    does_not_hold: Names
+    """Valves whose output was verified, with a requirement not met."""
+    not_verified: Names
+    """Valves whose output was made but not verified."""
+    not_made: Names
+    """Valves whose output could not be made."""
 
     @property
     def made(self) -> int:
@@ -155,9 +165,10 @@ class LotSummary(Artefact):
     """Name and version of this schema."""
     valves: Annotated[int, Meta(ge=1, le=10**9)]
     """Number of valves."""
-    calibrated: Annotated[Count, about("Number of valves with a firmware, verified if that was requested.")] = field(
+    calibrated: Count = field(
         init=False
     )
+    """Number of valves with a firmware, verified if that was requested."""
     failed: tuple[FailedValve, ...]
     """Valves that are not calibrated."""
     verified: bool
@@ -196,23 +207,25 @@ class UnfinishedLot(Artefact):
     """A lot whose batch runs, or was stopped: the same command takes it up."""
 
     FILE_NAME: ClassVar[str] = SUMMARY_NAME
-    schema: Annotated[Literal["dzdesign.batch-unfinished/1"], about("Name and version of this schema.")] = (
-        "dzdesign.batch-unfinished/1"
-    )
-    names: Annotated[Names, about("Names of the valves, in the order of the table.")]
+    schema: Literal["dzdesign.batch-unfinished/1"] = "dzdesign.batch-unfinished/1"
+    """Name and version of this schema."""
+    names: Names
+    """Names of the valves, in the order of the table."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ValveOutput:
     """Result of one output of one valve."""
 
-    target: Annotated[str, Meta(description="Kind of output, as listed by `codegen --list-targets`.", max_length=100)]
+    target: Annotated[str, Meta(max_length=100)]
+    """Kind of output, as listed by `codegen --list-targets`."""
     folder: FolderName
-    verdict: Annotated[OutputVerdict, about("Result of the verification. not made: the output was refused.")]
-    reason: Annotated[str, about("Reason why it was not made or does not hold, in one sentence.")] = ""
-    inputs: Annotated[
-        Annotated[int, Meta(ge=0, le=10**15)], about("Number of inputs that were compared with the exact law.")
-    ] = 0
+    verdict: OutputVerdict
+    """Result of the verification. not made: the output was refused."""
+    reason: str = ""
+    """Reason why it was not made or does not hold, in one sentence."""
+    inputs: Annotated[int, Meta(ge=0, le=10**15)] = 0
+    """Number of inputs that were compared with the exact law."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -220,18 +233,19 @@ class ValveManifest(Artefact):
     """Result of one valve of a lot."""
 
     FILE_NAME: ClassVar[str] = MANIFEST_NAME
-    schema: Annotated[Literal["dzdesign.batch-valve/1"], about("Name and version of this schema.")] = (
-        "dzdesign.batch-valve/1"
-    )
-    name: Annotated[str, about("Name of the valve.")]
-    status: Annotated[Status, about("Whether the valve is calibrated. does not hold: a requirement is not met.")]
-    reason: Annotated[str, about("Reason why it is not calibrated, in one sentence.")] = ""
-    inputs_sha256: Annotated[
-        Sha256 | None,
-        about("SHA-256 of the recordings, options and version; null if the next run must try again."),
-    ] = None
-    board: Annotated[Names, about("Files of the firmware for the user to complete.")] = ()
-    outputs: Annotated[
-        tuple[ValveOutput, ...], about("Results of the other outputs; empty if there are none.")
-    ] = ()
-    files: Annotated[Mapping[str, Sha256], about("SHA-256 of each file in the same folder.")]
+    schema: Literal["dzdesign.batch-valve/1"] = "dzdesign.batch-valve/1"
+    """Name and version of this schema."""
+    name: str
+    """Name of the valve."""
+    status: Status
+    """Whether the valve is calibrated. does not hold: a requirement is not met."""
+    reason: str = ""
+    """Reason why it is not calibrated, in one sentence."""
+    inputs_sha256: Sha256 | None = None
+    """SHA-256 of the recordings, options and version; null if the next run must try again."""
+    board: Names = ()
+    """Files of the firmware for the user to complete."""
+    outputs: tuple[ValveOutput, ...] = ()
+    """Results of the other outputs; empty if there are none."""
+    files: Mapping[str, Sha256]
+    """SHA-256 of each file in the same folder."""

@@ -23,11 +23,8 @@ from dzdesign.report.page import (
 )
 from dzdesign.verify.closed_loop.ramps import Curves, closed_loop_name, csv_of
 from dzdesign.verify.current.results import CurrentLoopResult
-from dzdesign.verify.loop_results import (
-    ClosedLoopResult,
-    PressureResult,
-    ScenarioResult,
-)
+from dzdesign.verify.evidence import Evidence
+from dzdesign.verify.loop_results import ClosedLoopResult, PressureResult, ScenarioResult
 
 #: Parameters of a plant that count where its edge does not.
 COIL_AND_SPOOL = (
@@ -51,15 +48,17 @@ def loop_section(chain: Chain) -> Section:
         figures.append(loop_figure(chain.curves[closed_loop_name(side)], side, len(sides) > 1, units, unseen))
     return Section(
         figures=figures,
-        tables=(
-            loops_table(loop.pressures, units),
-            readings_table(loop.pressures, units),
-            scenarios_table(evidence.scenarios, units),
-            plant_table(loop),
-            *current_tables(evidence.current_loop),
-        ),
+        tables=(*facts(evidence, units), plant_table(loop), *current_tables(evidence.current_loop)),
         lines=(_plant_line(loop),),
     )
+
+
+def facts(evidence: Evidence, units: RecordedUnits) -> tuple[Table, ...]:
+    """Return what the closed loop shows, the same on the page and on a terminal: ramps, readings, scenarios."""
+    pressures = evidence.closed_loop.pressures
+    ramps = (loops_table(pressures, units), readings_table(pressures, units)) if pressures else ()
+    scenarios = scenarios_table(evidence.scenarios, units)
+    return (*ramps, scenarios) if scenarios else ramps
 
 
 def _plant_line(loop: ClosedLoopResult) -> str:
@@ -130,15 +129,12 @@ def loops_table(pressures: Sequence[PressureResult], units: RecordedUnits) -> Ta
 
 def scenarios_table(scenarios: Sequence[ScenarioResult], units: RecordedUnits) -> Table | None:
     """Return each scenario at the pressure drop where it is worst; None if there are none."""
-    worst: dict[tuple[str, str], ScenarioResult] = {}
-    for each in sorted(scenarios, key=lambda one: (one.q_zero_L_min, one.q_peak_at_zero_L_min, one.dp_MPa)):
-        worst[each.name, each.not_required] = each
-    if not worst:
+    if not scenarios:
         return None
     flow = units.label("L/min")
     return table_of(
         "Beside ramps: each scenario at the pressures where it is worst",
-        [worst[key] for key in dict.fromkeys((each.name, each.not_required) for each in scenarios)],
+        worst_of_each(scenarios),
         ("scenario", lambda one: Cell(text=one.name, more=_where(one, scenarios, units))),
         in_units("dP", "dp_MPa", ".2f MPa", units),
         in_units("behind the edge", "back_MPa", ".2f MPa", units),
@@ -146,6 +142,14 @@ def scenarios_table(scenarios: Sequence[ScenarioResult], units: RecordedUnits) -
         (f"on the way, at most ({flow})", lambda one: in_number_font(one.in_words(one.q_peak_at_zero_L_min, units))),
         ("required", lambda one: _required(one, units) if one.must_shut else f"{one.not_required}: not required"),
     )
+
+
+def worst_of_each(scenarios: Sequence[ScenarioResult]) -> list[ScenarioResult]:
+    """Return each scenario where it is worst, in their order; one that is required in part stands twice."""
+    worst: dict[tuple[str, str], ScenarioResult] = {}
+    for each in sorted(scenarios, key=lambda one: (one.q_zero_L_min, one.q_peak_at_zero_L_min, one.dp_MPa)):
+        worst[each.name, each.not_required] = each
+    return [worst[key] for key in dict.fromkeys((each.name, each.not_required) for each in scenarios)]
 
 
 def _where(row: ScenarioResult, scenarios: Sequence[ScenarioResult], units: RecordedUnits) -> str:
@@ -167,7 +171,7 @@ def _where(row: ScenarioResult, scenarios: Sequence[ScenarioResult], units: Reco
 def _required(scenario: ScenarioResult, units: RecordedUnits) -> str:
     """Say what may flow at the end of a scenario."""
     allowed = scenario.allowed_at_zero_L_min
-    return "must be shut at the end" if allowed is None else f"{units.text(allowed, '.3g L/min')} at most at the end"
+    return "shut" if allowed is None else f"{units.text(allowed, '.3g L/min')} at most"
 
 
 def current_tables(result: CurrentLoopResult | None) -> tuple[Table, ...]:
