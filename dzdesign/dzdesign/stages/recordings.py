@@ -125,7 +125,7 @@ def read_recordings(
     """
     from dzdesign.identify.reading.column_labels import MissingColumnError, parse_columns
     from dzdesign.identify.reading.ramp_files import read_ramp_file
-    from dzdesign.identify.reading.units_of_columns import unit_of_pressure
+    from dzdesign.identify.reading.scaling import unit_of_pressure
 
     chosen = parse_columns(columns) if columns else {}
     skipped = None if skip_rows is None else read_skip_rows(skip_rows, "--skip-rows")
@@ -255,9 +255,9 @@ def _refuse_unnamed(tests: list["RampTest"], declared: Table) -> None:
 def refuse_copies(tests: Sequence["RampTest"]) -> None:
     """Refuse a recording that is given twice: counting a copy as a repeat would understate the uncertainty.
 
-    The same file, or the same samples: see `copies`.
+    The same file, or the same samples: see `series`.
     """
-    from dzdesign.identify.reading.copies import find_copy
+    from dzdesign.identify.reading.series import find_copy
 
     known: dict[str, str] = {}
     for recording in tests:

@@ -5,7 +5,7 @@ from itertools import pairwise
 
 from dzdesign.identify.data_quality.catalogue import Finding, warn
 from dzdesign.identify.reading.ramp_test import RampTest
-from dzdesign.identify.reading.series_order import began, ended, on_one_clock, order_is_stated, runs_back
+from dzdesign.identify.reading.series import began, ended, on_one_clock, order_is_stated, runs_back
 
 #: A pause within a series of ramps is shorter than this, s: half a year.
 LONGEST_PAUSE = 183 * 86_400.0

@@ -89,9 +89,7 @@ def lay_on_one_clock(
     time = found["time"]
     reference = _clock(table, time, u_max, data["time"])
     clocks = ClockColumns(table)
-    _refuse_an_unclear_one(table, clocks, found, reference, u_max)
-    if not time_is_chosen:
-        _refuse_another_time(table, clocks, found, reference, u_max)
+    _refuse_another_time(table, clocks, found, reference, u_max, time_is_chosen=time_is_chosen)
     others = {column.clock.label: _clock(table, column.clock, u_max) for column in found.values() if column.clock}
     differ = False
     for quantity, column in found.items():
@@ -165,45 +163,26 @@ def _laid(
     return laid
 
 
-def _refuse_an_unclear_one(
-    table: Table, clocks: ClockColumns, found: Mapping[str, Column], reference: Clock, u_max: float
-) -> None:
-    """Refuse a channel without a time of its own beside a time that no channel claims and that differs."""
-    time = found["time"]
-    alone = [each.label for name, each in found.items() if name != "time" and not clocks.of(name, each.label)]
-    if table.clocks or not alone or time.label not in table.labels:
-        return
-    claimed = {clocks.of("", label) for label in table.labels}
-    claimed |= {column.clock.label for column in found.values() if column.clock}
-    for label in clocks.labels:
-        if label == time.label or label in claimed or not clocks.are_alike(time.label, label):
-            continue
-        other = _clock(table, Column(label=label, unit=time.unit), u_max)
-        if not other.is_the_same(reference):
-            begin = other.seconds[:1] - reference.seconds[:1]
-            raise InputError(
-                f"'{table.path}' has times '{time.label}' and '{label}' that differ, by {float(begin[0]):.6g} s at "
-                f"first, and which is that of '{alone[-1]}' can't be told; put each directly before its quantity, "
-                "or name them t_u_s, t_Q_s"
-            )
-
-
 def _refuse_another_time(
-    table: Table, clocks: ClockColumns, found: Mapping[str, Column], reference: Clock, u_max: float
-) -> None:
+    table: Table, clocks: ClockColumns, found: Mapping[str, Column], reference: Clock, u_max: float,
+    *, time_is_chosen: bool,
+) -> None:  # fmt: skip
     """Refuse a second time that no channel claims and that differs: which channels were sampled by it is not known.
 
-    It rises from row to row, and has times in common. One from another zero, such as an uptime, tells nothing.
+    Either it is labelled as the first one is, or it rises from row to row and has times in common with it: one from
+    another zero, such as an uptime, tells nothing. Where the time was chosen the first kind is refused only.
     """
     time, claimed = found["time"], {clocks.of("-", label) for label in table.labels}
     claimed |= {each.clock.label for each in found.values() if each.clock} | set(time.label.split(AND))
     alone = [each.label for name, each in found.items() if name not in ("time", "u") and not each.clock]
     for label in table.labels if alone and not table.clocks else ():
-        beside = label not in claimed and table.length(label) == reference.seconds.size
-        column = clocks.counted(label) if beside else None
-        if column is None or table.is_clock(label) != table.is_clock(time.label):
+        alike = clocks.are_alike(time.label, label)
+        column = clocks.counted(label) if label not in claimed and (alike or not time_is_chosen) else None
+        if column is None or table.length(label) != reference.seconds.size:
             continue
         try:
+            if table.is_clock(label) != table.is_clock(time.label):
+                continue
             clock = _clock(table, column if column.unit else replace(column, unit=time.unit), u_max)
         except InputError:  # text, or a time that can't be read
             continue
@@ -213,12 +192,13 @@ def _refuse_another_time(
         rises = its.size > 1 and np.all(np.diff(its) > 0) and its[0] <= ours[-1] and its[-1] >= ours[0]
         if not column.unit:  # it may be a temperature, or the number of the row
             rises = rises and abs(np.ptp(its) - np.ptp(ours)) <= ALIKE_SPANS * np.ptp(ours)
-        if rises and abs(float(np.median(its - ours))) > ROUNDED * reference.step:
+        far = rises and abs(float(np.median(its - ours))) > ROUNDED * reference.step
+        if far or (alike and its.size and not clock.is_the_same(reference)):
+            choose = "" if alike else f', or choose one for all: --columns "time={time.label}"'
             raise InputError(
                 f"'{table.path}' has times '{time.label}' and '{label}' that differ, by {its[0] - ours[0]:.6g} s at "
                 f"first and {its[-1] - ours[-1]:.6g} s at last, and which is that of '{alone[-1]}' can't be told; name "
-                "each by its quantity, such as t_u_s and t_Q_s, or choose one for all: --columns "
-                f'"time={time.label}"'
+                f"each by its quantity, such as t_u_s and t_Q_s{choose}"
             )
 
 

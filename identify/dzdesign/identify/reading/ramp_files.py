@@ -30,11 +30,10 @@ from dzdesign.identify.reading.missing_values import (
     without_placeholders,
 )
 from dzdesign.identify.reading.ramp_test import RampTest, Switch, thin
-from dzdesign.identify.reading.scaling import Scaling, scaling_of
+from dzdesign.identify.reading.scaling import Scaling, scaling_of, units_of_columns
 from dzdesign.identify.reading.table import AND, QUOTED_CHARACTERS, Table
 from dzdesign.identify.reading.text_layout import read_text_table
 from dzdesign.identify.reading.time_stamps import Start
-from dzdesign.identify.reading.units_of_columns import units_of_columns
 from dzdesign.identify.valve.recorded_drop import DropColumns
 
 #: Fewest complete rows in which two branches with a threshold could stand.

@@ -104,11 +104,12 @@ class RampTest:
     unseen: tuple[float, float] = (0.0, 0.0)
     #: Rows whose flow lies beyond what the meter can show, (N,) bool; None: none does.
     beyond: np.ndarray | None = None
+    #: Flow below which nothing was written, which is given as zero here, m³/s; 0: there is none.
+    clipped_below: float = 0.0
     #: Columns of the command and the flow as they were found, by quantity.
     columns: Mapping[str, Column] = field(default_factory=dict)
     #: Units of the file's columns, each once; `u`, `dp` and `q` are in SI.
     units: Mapping[Quantity, tuple[Unit, ...]] = field(default_factory=dict)
-
     #: Columns beside those that were read, of two values each.
     switches: tuple[Switch, ...] = ()
 
@@ -142,7 +143,9 @@ class RampTest:
         return {switch.label: switch.at(at_top) for switch in self.switches}
 
     def part(self, rows: slice | np.ndarray) -> "RampTest":
-        """Return the recording with some of its rows."""
+        """Return the recording with some of its rows; of all of them itself, whose command is smoothed once."""
+        if isinstance(rows, np.ndarray) and rows.dtype == bool and rows.all():
+            return self
         dp = None if self.dp is None else self.dp[rows]
         beyond = None if self.beyond is None else self.beyond[rows]
         return replace(self, time=self.time[rows], u=self.u[rows], q=self.q[rows], dp=dp, beyond=beyond)
