@@ -6,21 +6,15 @@ a flow that is 0.24 s late moves a threshold by 80 mV. Nothing is extrapolated, 
 
 import logging
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import final
+from dataclasses import replace
 
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.reading.clock import ClockColumns, never_back, read_times_of_day
+from dzdesign.identify.reading.clock import SAME, Clock, ClockColumns, never_back, read_clock
 from dzdesign.identify.reading.column_labels import Column
-from dzdesign.identify.reading.missing_values import without_placeholders
-from dzdesign.identify.reading.scaling import scaling_of
 from dzdesign.identify.reading.table import AND, Table
-from dzdesign.identify.reading.time_stamps import DAY, Start, start_of
 
-#: Clocks are one where no sample is off by this share of a step: the jitter of a clock.
-SAME = 1e-3
 #: Two times of one row are one where their usual difference is within this share of a step: the last digit of one.
 ROUNDED = 0.1
 #: A column that may be a time or not is one if it goes as far, within this share.
@@ -37,44 +31,10 @@ LOST = 0.1
 logger = logging.getLogger(__name__)
 
 
-@final
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Clock:
-    """The times of a channel, in s, NaN where one is missing, and from when they count.
-
-    `stamp` is the date and time of zero; without a date, `of_day` is its time of day.
-    """
-
-    label: str
-    seconds: np.ndarray
-    stamp: Start | None
-    of_day: float | None = None
-
-    @property
-    def step(self) -> float:
-        """The usual step."""
-        steps = np.diff(self.seconds[np.isfinite(self.seconds)])
-        steps = steps[steps > 0]
-        return float(np.median(steps)) if steps.size else 0.0
-
-    def is_the_same(self, other: "Clock") -> bool:
-        """Tell whether two clocks have the same numbers, whatever they count from."""
-        one, its = self.seconds, other.seconds
-        return one.size == its.size and bool(np.all(np.abs(one - its)[np.isfinite(one - its)] <= SAME * self.step))
-
-    def ahead_of(self, other: "Clock") -> float | None:
-        """Return by how much later the zero of this clock is than that of another, s; None if nobody knows."""
-        if self.stamp and other.stamp and self.stamp.has_zone == other.stamp.has_zone:
-            return round(self.stamp.seconds - other.stamp.seconds, 5)  # a float of seconds since year 1 has no more
-        if self.of_day is not None and other.of_day is not None:
-            return (self.of_day - other.of_day + DAY / 2) % DAY - DAY / 2
-        counted = (self.stamp, self.of_day, other.stamp, other.of_day)
-        return 0.0 if counted == (None,) * 4 else None
-
-
 def lay_on_one_clock(
-    table: Table, found: Mapping[str, Column], data: dict[str, np.ndarray], u_max: float, *, time_is_chosen: bool
-) -> None:
+    table: Table, found: Mapping[str, Column], data: dict[str, np.ndarray], reference: Clock, u_max: float,
+    *, time_is_chosen: bool,
+) -> None:  # fmt: skip
     """Lay the channels that have a clock of their own on the command's, in place; NaN where there is no reading.
 
     With `time_is_chosen` the user has named the column of time, which then goes for all that has none of its own.
@@ -84,13 +44,10 @@ def lay_on_one_clock(
     InputError
         If clocks differ and have no common zero, or no time in common; if one goes back.
     """
-    if "time" not in found:
-        return
     time = found["time"]
-    reference = _clock(table, time, u_max, data["time"])
     clocks = ClockColumns(table)
     _refuse_another_time(table, clocks, found, reference, u_max, time_is_chosen=time_is_chosen)
-    others = {column.clock.label: _clock(table, column.clock, u_max) for column in found.values() if column.clock}
+    others = {column.clock.label: read_clock(table, column.clock, u_max) for column in found.values() if column.clock}
     differ = False
     for quantity, column in found.items():
         if column.clock is None:
@@ -113,19 +70,6 @@ def lay_on_one_clock(
             f"'{table.path}': '{clockless[0]}' states no time of its own, and the clocks of the other channels differ; "
             "export every channel with its start and step"
         )
-
-
-def _clock(table: Table, column: Column, u_max: float, seconds: np.ndarray | None = None) -> Clock:
-    """Return a column of time as a clock; `seconds` are its times, where they were read before."""
-    if not table.is_clock(column.label):
-        if seconds is None:
-            seconds, _ = without_placeholders(table.numbers(column.label), rises=True)
-            seconds = seconds * scaling_of(table.path, "time", column, u_max).gain if column.unit else seconds
-        return Clock(label=column.label, seconds=seconds, stamp=table.started(column.label))
-    seconds, stamp = read_times_of_day(table, column.label)
-    known = np.flatnonzero(np.isfinite(seconds))
-    day = start_of(f"2000-01-01 {table.cell(column.label, int(known[0]))}") if known.size and not stamp else None
-    return Clock(label=column.label, seconds=seconds, stamp=stamp, of_day=day.seconds % DAY if day else None)
 
 
 def _laid(
@@ -183,7 +127,7 @@ def _refuse_another_time(
         try:
             if table.is_clock(label) != table.is_clock(time.label):
                 continue
-            clock = _clock(table, column if column.unit else replace(column, unit=time.unit), u_max)
+            clock = read_clock(table, column if column.unit else replace(column, unit=time.unit), u_max)
         except InputError:  # text, or a time that can't be read
             continue
         its = clock.seconds + (clock.ahead_of(reference) or 0.0)

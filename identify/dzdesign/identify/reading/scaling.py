@@ -11,6 +11,8 @@ from fractions import Fraction
 from pathlib import Path
 from typing import final
 
+import numpy as np
+
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import (
     CommandUnit,
@@ -37,6 +39,7 @@ from dzdesign.identify.reading.column_labels import (
 )
 from dzdesign.identify.reading.missing_values import NO_CURRENT
 from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.reading.table import QUOTED_CHARACTERS, Table
 
 #: What a transmitter gives, or an amplifier takes; a range may be of any other unit, or of bare numbers.
 TRANSMITTED = ("current", "voltage")
@@ -47,6 +50,8 @@ MISTYPED = {"ma": "mA", "a": "A", "v": "V", "mv": "mV"}
 LIVE_ZERO = 0.004
 #: Full scale in the examples of messages.
 FULL_SCALE: Mapping[str, str] = {"u": "0..10 V", "Q": "0..50 L/min"}
+#: SI numbers beyond these are not a measurement of a valve: a wrong unit, or what a logger writes for an overflow.
+LARGEST = {"time": 1e12, "voltage": 1e4, "pressure": 1e9, "flow": 10.0}
 #: How many of a unit are 1 V, MPa or L/min, where numbers in it can be read: 1 MPa is 1e7 Ba.
 SMALLEST_FACTOR, LARGEST_FACTOR = 1e-9, 1e9
 #: What stands in front of one.
@@ -78,13 +83,34 @@ def scaling_of(path: Path, quantity: str, column: Column, u_max: float) -> Scali
         If the unit is none of the quantity's.
     """
     if not column.unit:
-        raise InputError(f"'{path}' column '{column.label}' has no unit; write for example {EXAMPLE_LABELS[quantity]}")
+        raise no_unit(path, quantity, column.label)
     try:
         if "=" in column.unit or ".." in column.unit:
             return _of_range(quantity, column, u_max)
         return Scaling(gain=_factor(quantity, column.unit, u_max))
     except InputError as error:
         raise InputError(f"'{path}' column '{column.label}': {error}{_hint(quantity, column)}") from error
+
+
+def no_unit(path: Path, quantity: str, label: str) -> InputError:
+    """Return the error for a column whose unit nobody knows."""
+    return InputError(f"'{path}' column '{label}' has no unit; write for example {EXAMPLE_LABELS[quantity]}")
+
+
+def in_SI(table: Table, quantity: str, column: Column, numbers: np.ndarray, scaling: Scaling) -> np.ndarray:
+    """Return one column in SI, NaN where a sample is missing; refuse what no valve gives."""
+    with np.errstate(over="ignore", invalid="ignore"):  # an infinity is refused below
+        numbers = numbers * scaling.gain
+        numbers += scaling.offset
+    largest = LARGEST[QUANTITY_OF_COLUMN[quantity]]
+    if np.fmax.reduce(numbers, initial=0.0) > largest or np.fmin.reduce(numbers, initial=0.0) < -largest:
+        row = int(np.flatnonzero(np.abs(numbers) > largest)[0])
+        raise InputError(
+            f"'{table.path}' {table.place(row)}, column '{column.label}': "
+            f"'{table.cell(column.label, row)[:QUOTED_CHARACTERS]}' is no measurement of a valve in that unit; "
+            "correct it, or leave the cell blank if the sample is missing"
+        )
+    return numbers
 
 
 def _of_range(quantity: str, column: Column, u_max: float) -> Scaling:
