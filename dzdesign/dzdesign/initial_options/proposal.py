@@ -163,7 +163,7 @@ def _pressure_table(
     remarks: _Remarks,
 ) -> tuple[dict[str, str], dict[str, tuple[str, ...]]]:
     """Return the pressure drops to declare, as declared or by names; and as what other files' names can be read."""
-    from dzdesign.identify.reading.named_pressure import pressures_in_name
+    from dzdesign.identify.reading.series import pressures_in_name
 
     if declared:
         return dict(declared) if isinstance(declared, Mapping) else dict.fromkeys(names, declared), {}
@@ -226,7 +226,7 @@ def _identified(tests: "list[RampTest]", u_max: float, guessed_dp: str, remarks:
 
 def _contradicted(tests: "Sequence[RampTest]") -> Iterator[tuple[str, str, float]]:
     """Yield recordings whose names say another pressure than was recorded, what they say, and that in MPa."""
-    from dzdesign.identify.reading.named_pressure import contradicts
+    from dzdesign.identify.reading.series import contradicts
 
     for test in tests:
         if test.dp is not None and not test.dp_is_declared:

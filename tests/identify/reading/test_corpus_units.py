@@ -111,7 +111,7 @@ def test_a_ramp_in_coarse_steps_is_no_staircase():
 )
 def test_the_edge_follows_from_the_ports(recorded, positive, negative):
     edge = metering_edge(recorded.split())
-    assert (edge.at(1), edge.at(-1), edge.ambiguous) == (positive, negative, False)
+    assert (edge.positive, edge.negative, edge.ambiguous) == (positive, negative, False)
 
 
 def test_four_ports_are_ambiguous():

@@ -13,8 +13,8 @@ from dzdesign.identify.constants import FULL_SWEEP, L_MIN, MPA
 from dzdesign.identify.data_quality.catalogue import Finding, warn
 from dzdesign.identify.ramps.pooling import SAME_PRESSURE
 from dzdesign.identify.ramps.splitting import SHUT
-from dzdesign.identify.reading.named_pressure import claimed_pressures, contradicts
 from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.reading.series import claimed_pressures, contradicts
 from dzdesign.identify.valve.ramp_result import TestResult
 
 #: Pressure drops that differ by less than this share are one number: averaging may round the last digit.

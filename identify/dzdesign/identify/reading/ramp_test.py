@@ -1,9 +1,9 @@
 """`RampTest`: one recorded ramp test, as all rooms of identify take it; of a long recording thinned."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import final
+from functools import cached_property, wraps
+from typing import Concatenate, ParamSpec, TypeVar, final
 
 import numpy as np
 
@@ -13,6 +13,8 @@ from dzdesign.identify.reading.time_stamps import Start
 from dzdesign.identify.valve.left_out import LeftOut
 from dzdesign.identify.valve.recorded_drop import DropColumns, DropSign
 
+Given = ParamSpec("Given")
+Found = TypeVar("Found")
 #: Rows of one recording that are kept at most: more are thinned.
 MOST_ROWS = 400_000
 #: Runs whose medians are taken at a time: what that takes of memory has a bound.
@@ -149,6 +151,22 @@ class RampTest:
         dp = None if self.dp is None else self.dp[rows]
         beyond = None if self.beyond is None else self.beyond[rows]
         return replace(self, time=self.time[rows], u=self.u[rows], q=self.q[rows], dp=dp, beyond=beyond)
+
+
+def once_a_recording(
+    function: "Callable[Concatenate[RampTest, Given], Found]",
+) -> "Callable[Concatenate[RampTest, Given], Found]":
+    """Return a function that is computed once for a recording and what else is given; nobody writes into its result."""
+
+    @wraps(function)
+    def found(test: RampTest, /, *given: Given.args, **named: Given.kwargs) -> Found:
+        known: dict[object, Found] = test.__dict__.setdefault("_found", {})
+        key = function.__name__, *given, *named.items()
+        if key not in known:
+            known[key] = function(test, *given, **named)
+        return known[key]
+
+    return found
 
 
 @final

@@ -89,6 +89,8 @@ class TextTable(Table):
     #: be one between thousands, a cell with it, where that stands.
     _certain: dict[str, tuple[str, str]] = field(default_factory=dict)
     _doubtful: dict[str, tuple[str, str, str]] = field(default_factory=dict)
+    #: First cells of columns that were looked at.
+    _firsts: dict[str, str] = field(default_factory=dict)
 
     @property
     def header(self) -> str:
@@ -105,7 +107,7 @@ class TextTable(Table):
 
     def cell(self, label: str, row: int) -> str:
         """Return a cell as it stands in the file."""
-        return str(self._texts(label)[row])
+        return str(self._texts(label, row + 1)[row])
 
     def numbers(self, label: str) -> np.ndarray:
         """Return a column as float64, NaN where the cell is blank."""
@@ -196,21 +198,23 @@ class TextTable(Table):
 
     def _first(self, label: str) -> str:
         """Return the first cell of a column that is not blank, nor stands for no value."""
-        texts = self._texts(label)
-        for some in (texts.head(FEW_ROWS), texts):
-            filled = some.filter((some != "") & ~some.str.contains(NO_VALUE)).head(1)
+        for rows in (FEW_ROWS, None) if label not in self._firsts else ():
+            texts = self._texts(label, rows)
+            filled = texts.filter((texts != "") & ~texts.str.contains(NO_VALUE)).head(1)
+            self._firsts[label] = str(filled[0]) if len(filled) else ""
             if len(filled):
-                return str(filled[0])
-        return ""
+                break
+        return self._firsts[label]
 
-    def _texts(self, label: str) -> "pl.Series":
-        """Return the cells of a column as they stand in the file, without blanks and quotes around them."""
+    def _texts(self, label: str, rows: int | None = None) -> "pl.Series":
+        """Return the cells of a column, or the first ones, as they stand in the file, without blanks and quotes."""
         import polars as pl
 
         pair = self.pair(label)
         if pair is None:
-            return self.cells.to_series(self.labels.index(label)).cast(pl.String).str.strip_chars(' \t"')
-        dates, times = (self._texts(each).str.replace("^'", "") for each in pair)
+            cells = self.cells.to_series(self.labels.index(label)).head(self.cells.height if rows is None else rows)
+            return cells.cast(pl.String).str.strip_chars(' \t"')
+        dates, times = (self._texts(each, rows).str.replace("^'", "") for each in pair)
         # A date that is written once holds for the rows below it.
         dates = dates.set(dates == "", None).fill_null(strategy="forward").fill_null(strategy="backward")
         return (dates + " " + times).zip_with(times != "", times)
