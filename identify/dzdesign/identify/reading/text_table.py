@@ -14,7 +14,7 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.reading.missing_values import NO_VALUE, without_markers
-from dzdesign.identify.reading.table import AND, QUOTED_CHARACTERS, Table
+from dzdesign.identify.reading.table import AND, QUOTED_CHARACTERS, Table, clean_label
 from dzdesign.identify.reading.time_stamps import (
     DATE_OF_A_NUMBER,
     EXAMPLE,
@@ -69,7 +69,8 @@ class TextTable(Table):
     Attributes
     ----------
     cells : DataFrame
-        A column of texts for each label, in their order; of numbers where a header states times by start and step.
+        A column of texts for each label, in their order; of numbers where a header states times by start and step, and
+        where they were read.
     header_line : int
         Number of the header's line.
     lines : (N,) array of int
@@ -107,12 +108,16 @@ class TextTable(Table):
 
     def cell(self, label: str, row: int) -> str:
         """Return a cell as it stands in the file."""
-        return str(self._texts(label, row + 1)[row])
+        cell = self.cells[row, self.labels.index(label)] if label in self.labels else self._texts(label)[row]
+        return clean_label(cell) if isinstance(cell, str) else f"{cell:.12g}"
 
     def numbers(self, label: str) -> np.ndarray:
         """Return a column as float64, NaN where the cell is blank."""
         import polars as pl
 
+        place = self.labels.index(label)
+        if self.cells.to_series(place).dtype == pl.Float64:
+            return np.asarray(self.cells.to_series(place).to_numpy())
         texts = self._texts(label)
         numbers = texts.cast(pl.Float64, strict=False)
         if (numbers.is_null() & (texts != "")).any():
@@ -126,7 +131,8 @@ class TextTable(Table):
         if (numbers.is_null() & (column != "")).any():
             numbers = numbers.fill_null(_plainly_written(column).cast(pl.Float64, strict=False))
             self._refuse_one(label, texts, numbers.is_null() & (column != ""))
-        return np.asarray(numbers.fill_null(np.nan).to_numpy())
+        self.cells.replace_column(place, numbers.fill_null(np.nan))  # both would double the memory of a long recording
+        return np.asarray(self.cells.to_series(place).to_numpy())
 
     def two_values(self, label: str) -> tuple[tuple[str, str], np.ndarray] | None:
         """Return the two texts that a column holds, and where it holds the second; None if it holds others."""
