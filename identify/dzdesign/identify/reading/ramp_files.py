@@ -31,7 +31,7 @@ from dzdesign.identify.reading.missing_values import (
 from dzdesign.identify.reading.ramp_test import RampTest, Switch, thin
 from dzdesign.identify.reading.scaling import in_SI, scaling_of, units_of_columns
 from dzdesign.identify.reading.table import AND, Table
-from dzdesign.identify.reading.text_layout import read_text_table
+from dzdesign.identify.reading.text_file import read_text_table
 
 #: Fewest complete rows in which two branches with a threshold could stand.
 MIN_ROWS = 20

@@ -1,4 +1,8 @@
-"""Files of text: an open file in, its lines out, decoded; what is no text, or too much of it, is refused by name."""
+"""Files of text: CSV of any delimiter, plain or gzip, with decimal point or comma; an open file in, a `TextTable` out.
+
+What is no text, or too much of it, is refused by name. Rows that look as samples do are taken as they are, all at once;
+each other line is looked at.
+"""
 
 import codecs
 import gzip
@@ -7,10 +11,17 @@ import logging
 import os
 import re
 import zlib
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
+import numpy as np
+
 from dzdesign.core.errors import InputError
+from dzdesign.identify.reading.logger_blocks import with_stated_times, without_blocks
+from dzdesign.identify.reading.table import QUOTED_CHARACTERS
+from dzdesign.identify.reading.text_header import ASIDE, BLANKS, MOST_LINES, Header, cells_of, find_header, is_value
+from dzdesign.identify.reading.text_table import TextTable, is_number
 
 if TYPE_CHECKING:
     import polars as pl
@@ -47,10 +58,61 @@ NO_TABLES = (
     (rb"\x93NUMPY", "a NumPy array (npy)", "save it by numpy.savetxt with a header of labels"),
     (rb"%PDF-", "a PDF document", FROM_ITS_PROGRAM),
 )
+#: Joins the cells of a line that was looked at: no cell of a text file holds it.
+CELL_END = "\x1f"
+#: What the first cell of a row of statistics says, in English and German, without what stands in brackets behind it.
+STATISTIC = re.compile(
+    r"(?:arithm\w*\W{0,2})?(?:mean|avg|average|mittel(?:wert)?|durchschnitt|median)(?:[ _]?value)?"
+    r"|(?:min|max)(?:imum|imal)?(?:[ _-]?(?:value|wert))?|peak(?:[ -]to[ -]peak)?|pk-?pk|spitze-spitze"
+    r"|(?:std|standard|st)[ ._-]{0,2}(?:dev|abw)\w{0,8}|std|sigma|var(?:iance|ianz)|spannweite"
+    r"|rms|eff(?:ektiv)?wert|sum|summe|count|anzahl",
+    re.IGNORECASE,
+)
+#: What a logger draws below a table, where nothing else stands in the row.
+RULE = re.compile(r"[-*=_\u2013\u2014]{2,}")
 logger = logging.getLogger(__name__)
 
 
-def read_lines(file: BinaryIO, path: Path) -> "pl.Series":
+def read_text_table(
+    file: BinaryIO, path: Path, skip_rows: int | None = None, missing: Collection[str] = ()
+) -> TextTable:
+    """Read a table of text.
+
+    Parameters
+    ----------
+    file : binary file
+        UTF-8, UTF-16 with a byte order mark or Windows-1252, plain or gzip: a header row, then samples; lines that
+        start with ``#`` are comments. Cells are parted by comma, semicolon, tab or ``|``, or by blanks where the
+        header has none of these. What a logger writes above the header and below the samples is passed over.
+    path : Path
+        For messages.
+    skip_rows : int, optional
+        Lines of the file that stand above the header. None: the header is found.
+    missing : collection of str
+        What stands for no value, beside what `missing_values` knows.
+
+    Raises
+    ------
+    InputError
+        If it is no such text, or a row has not as many cells as the header.
+    """
+    lines = _lines(file, path)
+    start = min(skip_rows or 0, lines.len())
+    lines, segments, has_blocks = without_blocks(lines, start, path)
+    header = find_header(lines, start, path, skip_rows, at_first_line=has_blocks or skip_rows is not None)
+    comments = "\n".join(lines.head(header.rows))
+    cells, places = _samples(lines.slice(header.rows), header, path)
+    table = TextTable(
+        path=path, labels=header.labels, units=header.units, comments=comments, cells=cells, header_line=header.line,
+        lines=places + 1, missing=missing,
+    )  # fmt: skip
+    return with_stated_times(table, segments)
+
+
+# the lines of a file
+
+
+def _lines(file: BinaryIO, path: Path) -> "pl.Series":
     """Return the lines of a file of text.
 
     A byte order mark tells the encoding (UTF-8, UTF-16); else it is UTF-8, else Windows-1252, which holds Latin-1 but
@@ -154,3 +216,98 @@ def _in_utf_8(data: bytes, path: Path) -> bytes:
         logger.debug("'%s' is text in Windows-1252", path)
         return data.decode("cp1252").encode()
     return data.removeprefix(codecs.BOM_UTF8)
+
+
+# the samples
+
+
+def _samples(lines: "pl.Series", header: Header, path: Path) -> "tuple[pl.DataFrame, np.ndarray]":
+    """Return the cells of the lines below a header that are samples, and the places of those lines in the file.
+
+    Comments, blank lines, the header when it stands there again, and what a logger wrote above or below the samples
+    are left out. Words amid samples are refused, and so are lines that begin as a sample does and are none.
+    """
+    import polars as pl
+
+    separator = header.separator
+    plain = _look_like_samples(lines, header)
+    kept = plain.to_numpy().copy()
+    others: list[tuple[int, list[str]]] = []
+    split: dict[int, str] = {}
+    for index, line in zip(np.flatnonzero(~kept).tolist(), lines.filter(~plain), strict=True):
+        if ASIDE.match(line) or line in header.repeats:
+            continue
+        cells = cells_of(line, separator, f"'{path}' row {header.rows + index + 1}")
+        kept[index] = len(cells) == len(header.labels) and not _is_no_sample(cells)
+        if kept[index]:
+            split[index] = CELL_END.join(cells)
+            continue
+        others.append((index, cells))
+        if len(others) > MOST_LINES:
+            break
+    samples = np.flatnonzero(kept)
+    first, last = (samples[0], samples[-1]) if samples.size else (kept.size, 0)
+    for index, cells in others:
+        number = header.rows + index + 1
+        if is_number(cells[0]) or first < index < last or len(others) > MOST_LINES:
+            raise _wrong_row(cells, number, header, path, above=index < first)
+        logger.debug("'%s' row %d is passed over: %s", path, number, " ".join(cells)[:QUOTED_CHARACTERS])
+    if split:
+        lines, separator = lines.str.replace_all(separator, CELL_END, literal=True), CELL_END
+        lines = lines.scatter(list(split), list(split.values()))
+    rows = lines.filter(pl.Series(kept)).str.split_exact(separator, len(header.labels) - 1)
+    return rows.struct.unnest(), header.rows + samples
+
+
+def _look_like_samples(lines: "pl.Series", header: Header) -> "pl.Series":
+    """Tell of each line whether it begins with a number, has as many cells as the header, and no quotes."""
+    separator, width = header.separator, len(header.labels)
+    if separator == BLANKS or width < 2:
+        return lines.str.starts_with("\n")
+    found = lines.str.contains(rf"^[ \t{separator}]{{0,8}}[0-9+.-]") & ~lines.str.contains('"', literal=True)
+    return found & (lines.str.count_matches(separator, literal=True) == width - 1) & ~lines.is_in(list(header.repeats))
+
+
+def _is_no_sample(cells: Sequence[str]) -> bool:
+    """Tell whether a row is a word of the logger, alone in its first cell, or one of statistics.
+
+    Examples
+    --------
+    >>> [_is_no_sample(cells) for cells in (["End", "", ""], ["Mittelwert:", "5,0", "1,0"], ["x", "5,0", "1,0"])]
+    [True, True, False]
+    """
+    first = cells[0]
+    if not first or (is_value(first) and not RULE.fullmatch(first)):
+        return False
+    return not any(cells[1:]) or _is_statistic(first)
+
+
+def _is_statistic(cell: str) -> bool:
+    bare = re.sub(r"[\[(].{0,40}$", "", cell[:QUOTED_CHARACTERS]).strip(" :=.")
+    return STATISTIC.fullmatch(bare) is not None
+
+
+def _wrong_row(cells: Sequence[str], number: int, header: Header, path: Path, *, above: bool) -> InputError:
+    """Return the error for a row that has too many or too few cells, or is a word of the logger amid samples.
+
+    `above`: it stands above all samples, so the header may be none.
+    """
+    width, word = len(header.labels), cells[0][:QUOTED_CHARACTERS]
+    the_header = f"the header, row {header.line} ('{', '.join(header.labels)[:QUOTED_CHARACTERS]}')"
+    begin = f"'{path}' row {number} has"
+    if len(cells) != width:
+        comma = header.separator == "," and len(cells) == 2 * width
+        advice = [
+            "decimal commas need ';' or a tab between the cells" if comma else "",
+            "complete the row, or delete it, as a logger that was stopped may have left half of one"
+            if len(cells) < width and is_number(word) and not above
+            else "correct the row, or begin it with # if it is no sample",
+            "--skip-rows says how many rows stand above the header" if above else "",
+        ]
+        found = f"{len(cells)} cell{'s' if len(cells) > 1 else f', {word!r}'}"
+        return InputError(f"{begin} {found}, expected {width} as in {the_header}; {'; '.join(filter(None, advice))}")
+    kind = "a statistic" if _is_statistic(word) else "a word and no number"
+    return InputError(
+        f"{begin} {kind}, '{word}', and samples below it, expected nothing but samples below {the_header}; begin "
+        "the row with # if it is no sample, or delete it; --skip-rows says how many rows stand above the header"
+    )

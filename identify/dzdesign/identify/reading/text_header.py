@@ -1,29 +1,25 @@
-"""Where a table lies among the lines of a text: its header, what parts its cells, its samples; a `TextTable` out.
+"""The header of a table among the lines of a text: its labels, what parts its cells, and where its samples begin.
 
 A logger writes about itself above the table: operator, date, a line a channel. Rows of numbers tell where the table
-begins, and the header is the line above them that has as many cells and reads best as labels of a ramp test. Rows that
-look as samples do are taken as they are, all at once; each other line is looked at.
+begins, and the header is the line above them that has as many cells and reads best as labels of a ramp test.
 """
 
 import csv
 import logging
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, final
-
-import numpy as np
+from typing import TYPE_CHECKING, final
 
 from dzdesign.core.errors import InputError
 from dzdesign.core.units import measures
 from dzdesign.identify.reading.column_labels import QUANTITIES, names_a_quantity, split_label
-from dzdesign.identify.reading.logger_blocks import COMMENT, with_stated_times, without_blocks
+from dzdesign.identify.reading.logger_blocks import COMMENT
 from dzdesign.identify.reading.missing_values import OF_A_SPREADSHEET, is_no_value
 from dzdesign.identify.reading.table import QUOTED_CHARACTERS, clean_label, numbered
-from dzdesign.identify.reading.text_file import read_lines
-from dzdesign.identify.reading.text_table import TextTable, is_number
+from dzdesign.identify.reading.text_table import is_number
 
 if TYPE_CHECKING:
     import polars as pl
@@ -51,18 +47,6 @@ ASIDE = re.compile(
 )
 #: Lines that stand aside for certain.
 ASIDE_AT_ONCE = r'^(?:[ \t]*#[ \t]|[ \t,;"]*$)'
-#: Joins the cells of a line that was looked at: no cell of a text file holds it.
-CELL_END = "\x1f"
-#: What the first cell of a row of statistics says, in English and German, without what stands in brackets behind it.
-STATISTIC = re.compile(
-    r"(?:arithm\w*\W{0,2})?(?:mean|avg|average|mittel(?:wert)?|durchschnitt|median)(?:[ _]?value)?"
-    r"|(?:min|max)(?:imum|imal)?(?:[ _-]?(?:value|wert))?|peak(?:[ -]to[ -]peak)?|pk-?pk|spitze-spitze"
-    r"|(?:std|standard|st)[ ._-]{0,2}(?:dev|abw)\w{0,8}|std|sigma|var(?:iance|ianz)|spannweite"
-    r"|rms|eff(?:ektiv)?wert|sum|summe|count|anzahl",
-    re.IGNORECASE,
-)
-#: What a logger draws below a table, where nothing else stands in the row.
-RULE = re.compile(r"[-*=_\u2013\u2014]{2,}")
 logger = logging.getLogger(__name__)
 
 
@@ -110,42 +94,6 @@ class Header:
     rows: int
 
 
-def read_text_table(
-    file: BinaryIO, path: Path, skip_rows: int | None = None, missing: Collection[str] = ()
-) -> TextTable:
-    """Read a table of text.
-
-    Parameters
-    ----------
-    file : binary file
-        UTF-8, UTF-16 with a byte order mark or Windows-1252, plain or gzip: a header row, then samples; lines that
-        start with ``#`` are comments. Cells are parted by comma, semicolon, tab or ``|``, or by blanks where the
-        header has none of these. What a logger writes above the header and below the samples is passed over.
-    path : Path
-        For messages.
-    skip_rows : int, optional
-        Lines of the file that stand above the header. None: the header is found.
-    missing : collection of str
-        What stands for no value, beside what `missing_values` knows.
-
-    Raises
-    ------
-    InputError
-        If it is no such text, or a row has not as many cells as the header.
-    """
-    lines = read_lines(file, path)
-    start = min(skip_rows or 0, lines.len())
-    lines, segments, has_blocks = without_blocks(lines, start, path)
-    header = _find_header(lines, start, path, skip_rows, at_first_line=has_blocks or skip_rows is not None)
-    comments = "\n".join(lines.head(header.rows))
-    cells, places = _samples(lines.slice(header.rows), header, path)
-    table = TextTable(
-        path=path, labels=header.labels, units=header.units, comments=comments, cells=cells, header_line=header.line,
-        lines=places + 1, missing=missing,
-    )  # fmt: skip
-    return with_stated_times(table, segments)
-
-
 # a line as cells
 
 
@@ -170,7 +118,7 @@ def cells_of(line: str, separator: str, where: str = "") -> list[str]:
     return [clean_label(cell) for cell in cells]
 
 
-def _is_value(cell: str) -> bool:
+def is_value(cell: str) -> bool:
     """Tell whether a cell is a number, or what stands for none."""
     return is_number(cell) or is_no_value(cell)
 
@@ -178,7 +126,7 @@ def _is_value(cell: str) -> bool:
 # the header
 
 
-def _find_header(
+def find_header(
     lines: "pl.Series", start: int, path: Path, skip_rows: int | None, *, at_first_line: bool
 ) -> Header:
     """Return the header, which stands in the line `start` or below it.
@@ -322,7 +270,7 @@ def _first_row(lines: list[Line], separator: str) -> int | None:
 def _is_row_of_numbers(cells: list[str]) -> bool:
     """Tell whether cells are a row of samples: mostly numbers, the first one too."""
     filled = [cell for cell in cells if cell]
-    numbers = sum(map(_is_value, filled))
+    numbers = sum(map(is_value, filled))
     return numbers >= 2 and is_number(filled[0]) and numbers >= SHARE_OF_NUMBERS * len(filled)
 
 
@@ -415,98 +363,3 @@ def _fitted(labels: tuple[str, ...], cells: list[str]) -> tuple[str, ...]:
     if len(cells) == len(labels) - 1 and labels[-1].lower() in ("", COMMENT):
         return labels[:-1]
     return (*labels, "") if len(cells) == len(labels) + 1 and not cells[-1] else labels
-
-
-# the samples
-
-
-def _samples(lines: "pl.Series", header: Header, path: Path) -> "tuple[pl.DataFrame, np.ndarray]":
-    """Return the cells of the lines below a header that are samples, and the places of those lines in the file.
-
-    Comments, blank lines, the header when it stands there again, and what a logger wrote above or below the samples
-    are left out. Words amid samples are refused, and so are lines that begin as a sample does and are none.
-    """
-    import polars as pl
-
-    separator = header.separator
-    plain = _look_like_samples(lines, header)
-    kept = plain.to_numpy().copy()
-    others: list[tuple[int, list[str]]] = []
-    split: dict[int, str] = {}
-    for index, line in zip(np.flatnonzero(~kept).tolist(), lines.filter(~plain), strict=True):
-        if ASIDE.match(line) or line in header.repeats:
-            continue
-        cells = cells_of(line, separator, f"'{path}' row {header.rows + index + 1}")
-        kept[index] = len(cells) == len(header.labels) and not _is_no_sample(cells)
-        if kept[index]:
-            split[index] = CELL_END.join(cells)
-            continue
-        others.append((index, cells))
-        if len(others) > MOST_LINES:
-            break
-    samples = np.flatnonzero(kept)
-    first, last = (samples[0], samples[-1]) if samples.size else (kept.size, 0)
-    for index, cells in others:
-        number = header.rows + index + 1
-        if is_number(cells[0]) or first < index < last or len(others) > MOST_LINES:
-            raise _wrong_row(cells, number, header, path, above=index < first)
-        logger.debug("'%s' row %d is passed over: %s", path, number, " ".join(cells)[:QUOTED_CHARACTERS])
-    if split:
-        lines, separator = lines.str.replace_all(separator, CELL_END, literal=True), CELL_END
-        lines = lines.scatter(list(split), list(split.values()))
-    rows = lines.filter(pl.Series(kept)).str.split_exact(separator, len(header.labels) - 1)
-    return rows.struct.unnest(), header.rows + samples
-
-
-def _look_like_samples(lines: "pl.Series", header: Header) -> "pl.Series":
-    """Tell of each line whether it begins with a number, has as many cells as the header, and no quotes."""
-    separator, width = header.separator, len(header.labels)
-    if separator == BLANKS or width < 2:
-        return lines.str.starts_with("\n")
-    found = lines.str.contains(rf"^[ \t{separator}]{{0,8}}[0-9+.-]") & ~lines.str.contains('"', literal=True)
-    return found & (lines.str.count_matches(separator, literal=True) == width - 1) & ~lines.is_in(list(header.repeats))
-
-
-def _is_no_sample(cells: Sequence[str]) -> bool:
-    """Tell whether a row is a word of the logger, alone in its first cell, or one of statistics.
-
-    Examples
-    --------
-    >>> [_is_no_sample(cells) for cells in (["End", "", ""], ["Mittelwert:", "5,0", "1,0"], ["x", "5,0", "1,0"])]
-    [True, True, False]
-    """
-    first = cells[0]
-    if not first or (_is_value(first) and not RULE.fullmatch(first)):
-        return False
-    return not any(cells[1:]) or _is_statistic(first)
-
-
-def _is_statistic(cell: str) -> bool:
-    bare = re.sub(r"[\[(].{0,40}$", "", cell[:QUOTED_CHARACTERS]).strip(" :=.")
-    return STATISTIC.fullmatch(bare) is not None
-
-
-def _wrong_row(cells: Sequence[str], number: int, header: Header, path: Path, *, above: bool) -> InputError:
-    """Return the error for a row that has too many or too few cells, or is a word of the logger amid samples.
-
-    `above`: it stands above all samples, so the header may be none.
-    """
-    width, word = len(header.labels), cells[0][:QUOTED_CHARACTERS]
-    the_header = f"the header, row {header.line} ('{', '.join(header.labels)[:QUOTED_CHARACTERS]}')"
-    begin = f"'{path}' row {number} has"
-    if len(cells) != width:
-        comma = header.separator == "," and len(cells) == 2 * width
-        advice = [
-            "decimal commas need ';' or a tab between the cells" if comma else "",
-            "complete the row, or delete it, as a logger that was stopped may have left half of one"
-            if len(cells) < width and is_number(word) and not above
-            else "correct the row, or begin it with # if it is no sample",
-            "--skip-rows says how many rows stand above the header" if above else "",
-        ]
-        found = f"{len(cells)} cell{'s' if len(cells) > 1 else f', {word!r}'}"
-        return InputError(f"{begin} {found}, expected {width} as in {the_header}; {'; '.join(filter(None, advice))}")
-    kind = "a statistic" if _is_statistic(word) else "a word and no number"
-    return InputError(
-        f"{begin} {kind}, '{word}', and samples below it, expected nothing but samples below {the_header}; begin "
-        "the row with # if it is no sample, or delete it; --skip-rows says how many rows stand above the header"
-    )
