@@ -29,7 +29,7 @@ from dzdesign.identify.reading.missing_values import (
     without_placeholders,
 )
 from dzdesign.identify.reading.ramp_test import RampTest, Switch, thin
-from dzdesign.identify.reading.scaling import in_SI, scaling_of, units_of_columns
+from dzdesign.identify.reading.scaling import Scaling, in_SI, scaling_of, units_of_columns
 from dzdesign.identify.reading.table import AND, Table
 from dzdesign.identify.reading.text_file import read_text_table
 
@@ -130,7 +130,8 @@ def _ramp_test(
     table.load([each.label for column in found.values() for each in column.every])
     data: dict[str, np.ndarray] = {}
     missing: dict[str, Missing] = {}
-    q_range, clock = None, None
+    scalings: dict[str, Scaling] = {}
+    clock = None
     for quantity, column in found.items():
         if quantity == "time":
             clock = read_clock(table, column, u_max, no_numbers)
@@ -139,11 +140,11 @@ def _ramp_test(
         for each in column.every:
             numbers, placeholders = without_placeholders(table.numbers(each.label), rises=False, declared=no_numbers)
             scaling = scaling_of(table.path, quantity, each, u_max)
+            scalings.setdefault(quantity, scaling)
             numbers, failed = without_failed_signals(numbers, scaling.no_signal_below)
             missing[each.label] = table.marked.get(each.label, Missing()) + placeholders + failed
             numbers = in_SI(table, quantity, each, numbers, scaling)
             data[quantity] = numbers if each is column else data[quantity] - numbers
-            q_range = scaling.ends if quantity == "Q" else q_range
     refuse_an_early_end(table, found, data)
     if clock:
         lay_on_one_clock(table, found, data, clock, u_max, time_is_chosen="time" in chosen)
@@ -162,7 +163,7 @@ def _ramp_test(
     without_flow = data["u"][np.isfinite(data["u"]) & ~np.isfinite(data["Q"])]
     described = describe_missing(missing)
     side_without = side_without_dp(edge, labels, table.path, data["u"], u_max)
-    units = units_of_columns(table.path, found, u_max)
+    units = units_of_columns(table.path, found, scalings["u"], u_max)
     switches = list(_switches(table, found, rows[0], complete))
     _refuse_too_few_rows(table.path, rows.shape[1], described)
     thinned = thin(rows)
@@ -186,7 +187,7 @@ def _ramp_test(
         missing=described,
         stamp=clock.stamp if clock else None,
         started=clock.stamp.seconds if clock and clock.stamp else None,
-        q_range=q_range,
+        q_range=scalings["Q"].ends,
         unseen=(float(without_flow.min(initial=0.0)), float(without_flow.max(initial=0.0))),
         units=units,
         switches=tuple(replace(each, changes=each.changes / in_ms) for each in switches),

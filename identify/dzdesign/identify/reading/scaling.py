@@ -237,11 +237,13 @@ def range_example(quantity: str, label: str, unit: str) -> str:
 # the units for a reader
 
 
-def units_of_columns(path: Path, found: Mapping[str, Column], u_max: float) -> dict[Quantity, tuple[Unit, ...]]:
-    """Return the units of a recording's columns, by quantity; 100 % of a command is `u_max`, V."""
+def units_of_columns(
+    path: Path, found: Mapping[str, Column], command: Scaling, u_max: float
+) -> dict[Quantity, tuple[Unit, ...]]:
+    """Return the units of a recording's columns, by quantity, with the command's scaling; 100 % of it is `u_max`, V."""
     pressures = (pressure_unit(found[name].unit) for name in PRESSURES if name in found)
     units: dict[Quantity, tuple[Unit, ...]] = {
-        "command": (_command_unit(path, found["u"], u_max),),
+        "command": (_command_unit(path, found["u"], command, u_max),),
         "pressure": tuple(dict.fromkeys(unit for unit in pressures if unit)),
         "flow": tuple(unit for unit in (_flow_unit(found["Q"].unit),) if unit),
     }
@@ -296,13 +298,13 @@ def _extreme(factor: float) -> bool:
     return not SMALLEST_FACTOR <= abs(factor) <= LARGEST_FACTOR
 
 
-def _command_unit(path: Path, column: Column, u_max: float) -> CommandUnit:
+def _command_unit(path: Path, column: Column, scaling: Scaling, u_max: float) -> CommandUnit:
     """Return the unit of a command: that of the signal as it is declared, or else the column's own.
 
     A range of volts that stands for other volts, or for percent, is shown in what it stands for: two kinds of volts
     in one table would be taken for one another.
     """
-    scaling, unit, declared = scaling_of(path, "u", column, u_max), column.unit.strip(), ""
+    unit, declared = column.unit.strip(), ""
     signal = read_signal_range(unit, "u", points=True) if "=" in unit else None
     if signal is not None and signal.meaning is not None:
         declared = " ".join(unit.split())

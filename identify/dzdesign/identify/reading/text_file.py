@@ -58,7 +58,7 @@ NO_TABLES = (
     (rb"\x93NUMPY", "a NumPy array (npy)", "save it by numpy.savetxt with a header of labels"),
     (rb"%PDF-", "a PDF document", FROM_ITS_PROGRAM),
 )
-#: Joins the cells of a line that was looked at: no cell of a text file holds it.
+#: Joins the cells of a line that was looked at: no text holds it.
 CELL_END = "\x1f"
 #: What the first cell of a row of statistics says, in English and German, without what stands in brackets behind it.
 STATISTIC = re.compile(
@@ -151,7 +151,7 @@ def _decoded(file: BinaryIO, path: Path) -> bytes:
         if by_name or re.match(mark, start, re.DOTALL):
             raise InputError(f"'{path}' is {what}; {way_out}")
     text = _from_utf_16(data, path) if is_utf_16 else _in_utf_8(data, path)
-    if b"\0" in text:
+    if b"\0" in text or CELL_END.encode() in text:
         raise InputError(
             f"'{path}' is UTF-16 without a byte order mark, or no text at all, expected UTF-8{SAVE_AS_CSV}"
         )

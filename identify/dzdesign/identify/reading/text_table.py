@@ -109,7 +109,7 @@ class TextTable(Table):
     def cell(self, label: str, row: int) -> str:
         """Return a cell as it stands in the file."""
         cell = self.cells[row, self.labels.index(label)] if label in self.labels else self._texts(label)[row]
-        return clean_label(cell) if isinstance(cell, str) else f"{cell:.12g}"
+        return clean_label(cell) if isinstance(cell, str) else f"{cell:g}"
 
     def numbers(self, label: str) -> np.ndarray:
         """Return a column as float64, NaN where the cell is blank."""
