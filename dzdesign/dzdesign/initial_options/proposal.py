@@ -16,7 +16,7 @@ from dzdesign.stages.recordings import distinct_names, expand, read_recordings, 
 from dzdesign.terminal.progress import say, stage_progress, with_bar
 
 if TYPE_CHECKING:
-    from dzdesign.identify.reading.proposed_columns import ProposedColumns
+    from dzdesign.identify.reading.columns import ProposedColumns
     from dzdesign.identify.reading.ramp_test import RampTest
     from dzdesign.identify.valve.model import ValveModel
 
@@ -67,7 +67,7 @@ def propose(
 ) -> Proposal:  # fmt: skip
     """Look at recordings, and return the file of options that this gives."""
     from dzdesign.identify.reading.column_labels import PER_CENT, parse_columns
-    from dzdesign.identify.reading.proposed_columns import propose_columns
+    from dzdesign.identify.reading.columns import propose_columns
 
     patterns, remarks = paths_of(ramps), _Remarks()
     paths = expand(patterns) if patterns else _found_recordings()

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from dzdesign.command_line.cli import main
-from dzdesign.identify.reading.proposed_columns import propose_columns
+from dzdesign.identify.reading.columns import propose_columns
 from dzdesign.identify.reading.series import pressures_in_name
 from tests.support.synthetic import L_MIN, MPA, Truth, synthetic_ramp
 

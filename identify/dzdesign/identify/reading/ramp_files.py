@@ -10,13 +10,12 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 
 from dzdesign.core.artefact_files import open_bytes, sha256_of_file
 from dzdesign.core.errors import InputError
-from dzdesign.identify.reading.binary_table import LONGEST_MARK, format_of, read_binary_table
+from dzdesign.identify.reading.binary_table import read_table
 from dzdesign.identify.reading.channel_clocks import lay_on_one_clock, refuse_an_early_end
 from dzdesign.identify.reading.clock import ASSUMED_MS, doubt_of_clock, never_back, read_clock
 from dzdesign.identify.reading.column_labels import PRESSURES, Column
@@ -31,7 +30,6 @@ from dzdesign.identify.reading.missing_values import (
 from dzdesign.identify.reading.ramp_test import RampTest, Switch, thin
 from dzdesign.identify.reading.scaling import Scaling, in_SI, scaling_of, units_of_columns
 from dzdesign.identify.reading.table import AND, Table
-from dzdesign.identify.reading.text_file import read_text_table
 
 #: Fewest complete rows in which two branches with a threshold could stand.
 MIN_ROWS = 20
@@ -96,22 +94,6 @@ def _numbers_among(missing: Collection[str]) -> list[float]:
         with suppress(ValueError):
             numbers.append(float(text.replace(",", ".")))
     return numbers
-
-
-def read_table(
-    file: BinaryIO, path: Path, skip_rows: int | None = None, missing: Collection[str] = ()
-) -> Table:
-    """Read a table of any known format; its first bytes tell which, not its name.
-
-    Raises
-    ------
-    InputError
-        If it is none of these, or not a whole one.
-    """
-    start = file.read(LONGEST_MARK)
-    file.seek(0)
-    kind = format_of(start, path)
-    return read_binary_table(file, path, kind) if kind else read_text_table(file, path, skip_rows, missing)
 
 
 def _ramp_test(
