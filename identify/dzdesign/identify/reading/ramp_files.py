@@ -8,8 +8,9 @@ import io
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import final
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from dzdesign.core.artefact_files import open_bytes, sha256_of_file
 from dzdesign.core.errors import InputError
 from dzdesign.identify.reading.binary_table import read_table
 from dzdesign.identify.reading.channel_clocks import lay_on_one_clock, refuse_an_early_end
-from dzdesign.identify.reading.clock import ASSUMED_MS, doubt_of_clock, never_back, read_clock
+from dzdesign.identify.reading.clock import ASSUMED_MS, Clock, doubt_of_clock, never_back, read_clock
 from dzdesign.identify.reading.column_labels import PRESSURES, Column
 from dzdesign.identify.reading.columns import find_columns
 from dzdesign.identify.reading.metering_edge import metering_edge, side_without_dp
@@ -96,6 +97,50 @@ def _numbers_among(missing: Collection[str]) -> list[float]:
     return numbers
 
 
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Channels:
+    """The columns of a recording as they were found and read.
+
+    Attributes
+    ----------
+    data : dict
+        Quantity -> samples in SI, NaN where one is missing.
+    scalings : dict
+        Quantity -> what turned them into SI, the time apart.
+    missing : dict
+        Label -> what stood there for no value.
+    clock : Clock or None
+        The time; None where the sample rate is declared.
+    """
+
+    data: dict[str, np.ndarray]
+    scalings: dict[str, Scaling]
+    missing: dict[str, Missing]
+    clock: Clock | None
+
+
+def _read_channels(table: Table, found: Mapping[str, Column], u_max: float, no_numbers: Sequence[float]) -> _Channels:
+    data: dict[str, np.ndarray] = {}
+    scalings: dict[str, Scaling] = {}
+    missing: dict[str, Missing] = {}
+    clock = None
+    for quantity, column in found.items():
+        if quantity == "time":
+            clock = read_clock(table, column, u_max, no_numbers)
+            data[quantity], missing[column.label] = clock.seconds, clock.missing
+            continue
+        for each in column.every:
+            numbers, placeholders = without_placeholders(table.numbers(each.label), rises=False, declared=no_numbers)
+            scaling = scaling_of(table.path, quantity, each, u_max)
+            numbers, failed = without_failed_signals(numbers, scaling.no_signal_below)
+            missing[each.label] = table.marked.get(each.label, Missing()) + placeholders + failed
+            numbers = in_SI(table, quantity, each, numbers, scaling)
+            data[quantity] = numbers if each is column else data[quantity] - numbers
+            scalings.setdefault(quantity, scaling)
+    return _Channels(data=data, scalings=scalings, missing=missing, clock=clock)
+
+
 def _ramp_test(
     table: Table,
     sha256: str,
@@ -110,23 +155,8 @@ def _ramp_test(
     _refuse_two_pressures(table, found, dp)
     _refuse_unequal_lengths(table, found)
     table.load([each.label for column in found.values() for each in column.every])
-    data: dict[str, np.ndarray] = {}
-    missing: dict[str, Missing] = {}
-    scalings: dict[str, Scaling] = {}
-    clock = None
-    for quantity, column in found.items():
-        if quantity == "time":
-            clock = read_clock(table, column, u_max, no_numbers)
-            data[quantity], missing[column.label] = clock.seconds, clock.missing
-            continue
-        for each in column.every:
-            numbers, placeholders = without_placeholders(table.numbers(each.label), rises=False, declared=no_numbers)
-            scaling = scaling_of(table.path, quantity, each, u_max)
-            scalings.setdefault(quantity, scaling)
-            numbers, failed = without_failed_signals(numbers, scaling.no_signal_below)
-            missing[each.label] = table.marked.get(each.label, Missing()) + placeholders + failed
-            numbers = in_SI(table, quantity, each, numbers, scaling)
-            data[quantity] = numbers if each is column else data[quantity] - numbers
+    channels = _read_channels(table, found, u_max, no_numbers)
+    data, clock, scalings = channels.data, channels.clock, channels.scalings
     refuse_an_early_end(table, found, data)
     if clock:
         lay_on_one_clock(table, found, data, clock, u_max, time_is_chosen="time" in chosen)
@@ -143,11 +173,11 @@ def _ramp_test(
         row[:] = samples[complete]
     rows[0] = never_back(table, rows[0], complete)
     without_flow = data["u"][np.isfinite(data["u"]) & ~np.isfinite(data["Q"])]
-    described = describe_missing(missing)
     side_without = side_without_dp(edge, labels, table.path, data["u"], u_max)
     units = units_of_columns(table.path, found, scalings["u"], u_max)
     switches = list(_switches(table, found, rows[0], complete))
-    _refuse_too_few_rows(table.path, rows.shape[1], described)
+    missing = describe_missing(channels.missing)
+    _refuse_too_few_rows(table.path, rows.shape[1], missing)
     thinned = thin(rows)
     time, u, q, *drop = (np.array(column) for column in thinned.rows)
     doubt = doubt_of_clock(table.path, clock, rows[0], time, u) if clock else ""
@@ -166,7 +196,7 @@ def _ramp_test(
         run=thinned.run,
         clock_doubt=doubt,
         simulated=_is_marked(table.comments),
-        missing=described,
+        missing=missing,
         stamp=clock.stamp if clock else None,
         started=clock.stamp.seconds if clock and clock.stamp else None,
         q_range=scalings["Q"].ends,
