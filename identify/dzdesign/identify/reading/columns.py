@@ -103,12 +103,11 @@ def _with_own_clocks(table: Table, columns: dict[str, Column], clocks: ClockColu
     time = columns["time"]
     for quantity, column in columns.items():
         own = clocks.of(quantity, column.label) if quantity != "time" else ""
-        for less in filter(None, (column.less,)):
-            if clocks.of(quantity, less.label) != own:
-                raise InputError(
-                    f"'{table.path}': '{column.label}' and '{less.label}' have clocks of their own, and no difference "
-                    "of the two is taken; export the commands with one"
-                )
+        if column.less and clocks.of(quantity, column.less.label) != own:
+            raise InputError(
+                f"'{table.path}': '{column.label}' and '{column.less.label}' have clocks of their own, and no "
+                "difference of the two is taken; export the commands with one"
+            )
         if not own or time.label in (own, table.dated(own)):
             continue
         if quantity == "u":
@@ -172,8 +171,6 @@ class ProposedColumns:
         Quantity -> column that is the only one it can be, by its unit.
     unclear : dict
         Quantity -> why it could not be told.
-    bare_pressures : tuple of str
-        Labels that look like a pressure and have no unit, where no pressure drop is known.
     pressures : dict
         Columns that may make the pressure drop, for a person to say which is which: label -> unit, "" if it has none.
     command_range : str
@@ -187,7 +184,6 @@ class ProposedColumns:
     known: dict[str, Column]
     proposed: dict[str, Column]
     unclear: dict[str, str]
-    bare_pressures: tuple[str, ...]
     pressures: dict[str, str]
     command_range: str = ""
     times: tuple[str, ...] = ()
@@ -219,6 +215,13 @@ class ProposedColumns:
         if timeless and self.times:
             clock = f", and as time that of the command, for example time={self.times[0]}"
         return f'; by their units, give --columns "{self.to_paste}"{unknown}{clock}'
+
+    @property
+    def bare_pressures(self) -> tuple[str, ...]:
+        """Labels that look like a pressure and have no unit, where no pressure drop is known."""
+        ports = {column.label for column in self.known.values()}
+        bare = (label for label, unit in self.pressures.items() if not unit and label not in ports)
+        return () if self.has_dp or "dP" in self.proposed else tuple(bare)
 
     @property
     def has_dp(self) -> bool:
@@ -298,12 +301,9 @@ def _proposed(
         why = "if each drives a solenoid, their difference is the signed command:"
         why = why if LESS.search(command_range) else "or say what its numbers mean, for example"
         unclear["u"] += f"; {why} --columns \"u={command_range}\""
-    has_pressure = bool(edge.quantities) or "dP" in proposed
-    bare = (label for label, unit in pressures.items() if not unit and label not in taken)
     return ProposedColumns(
-        labels=table.labels, known=known, proposed=proposed, unclear=unclear,
-        bare_pressures=() if has_pressure else tuple(bare),
-        pressures=pressures, command_range=command_range, times=tuple(times),
+        labels=table.labels, known=known, proposed=proposed, unclear=unclear, pressures=pressures,
+        command_range=command_range, times=tuple(times),
     )  # fmt: skip
 
 
