@@ -27,6 +27,8 @@ from dzdesign.identify.reading.ramp_test import RampTest
 ROUNDING = 2.0
 #: Flow passes above this share of the largest one. A copy has so many rows there, over this share of the commands.
 LARGE_FLOW, FEWEST, SAME_RANGE = 0.05, 20, 0.25
+#: Rows that are looked for first, and how many of them may be missed.
+FIRST_LOOK, MOST_MISSED = 16, 3
 #: Share of the rows that a copy may have changed, such as a spike that was taken out.
 SPOILT = 1e-3
 #: Shift of the thresholds, over the largest command, that two repeats of a valve show at least; rows that then differ.
@@ -135,6 +137,10 @@ def _is_at_the_pressure_of(part: RampTest, whole: RampTest) -> bool:
 
 def _agreeing(rows: np.ndarray, whole: RampTest, steps: np.ndarray) -> int:
     """Return how many rows (2, N) of command and flow, rounded to steps, are in a recording; 0 if it has no copy."""
+    look = rows[:, np.linspace(0, rows.shape[1] - 1, FIRST_LOOK).astype(int)].T
+    near = (np.any((np.abs(whole.u - u) <= steps[0]) & (np.abs(whole.q - q) <= steps[1])) for u, q in look)
+    if FIRST_LOOK - sum(near) > MOST_MISSED:
+        return 0
     ours, its = _keys(rows, steps), _keys(np.stack([whole.u, whole.q]), steps)
     agree = int(np.count_nonzero(np.isin(ours, its).any(axis=0)))
     u, q = np.abs(rows)
