@@ -16,7 +16,7 @@ from dzdesign.identify.identification import identify_sides
 from dzdesign.identify.plots.style import plot_style
 from dzdesign.identify.plots.valve_plots import draw_figures
 from dzdesign.identify.reading.ramp_files import read_ramp_file
-from dzdesign.identify.reading.units_of_columns import units_of
+from dzdesign.identify.reading.scaling import units_of
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.artefacts import Chain
 from dzdesign.report.figure import figure_style

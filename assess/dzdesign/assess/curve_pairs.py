@@ -13,7 +13,7 @@ from dzdesign.identify.knees.prepared_tests import found_floor, split_recordings
 from dzdesign.identify.ramps.pooling import SAME_PRESSURE, pool_ramps
 from dzdesign.identify.ramps.sides import tests_of_side
 from dzdesign.identify.reading.ramp_test import RampTest
-from dzdesign.identify.reading.units_of_columns import units_of
+from dzdesign.identify.reading.scaling import units_of
 from dzdesign.identify.valve.model import SIDES
 
 Pair = tuple[PressureCurves | None, PressureCurves | None]

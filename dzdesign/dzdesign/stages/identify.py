@@ -218,7 +218,7 @@ def read_again(options: "StatedOptions", files: Mapping[str, Path]) -> ReadAgain
         If an option or a file can't be read.
     """
     from dzdesign.identify.reading.low_flow_readings import read_low_flow
-    from dzdesign.identify.reading.series_order import in_stated_order
+    from dzdesign.identify.reading.series import in_stated_order
 
     known = {argument.name for argument in arguments_of(IdentifyArguments)} - {*NOT_STATED, "order"}
     given: dict[str, Any] = {**options.texts, **options.tables, **options.lists}

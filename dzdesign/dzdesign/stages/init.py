@@ -25,7 +25,7 @@ from dzdesign.stages.recordings import (
 from dzdesign.terminal.progress import say, stage_progress, with_bar
 
 if TYPE_CHECKING:
-    from dzdesign.identify.reading.proposed_columns import ProposedColumns
+    from dzdesign.identify.reading.columns import ProposedColumns
     from dzdesign.identify.reading.ramp_test import RampTest
     from dzdesign.identify.valve.model import ValveModel
 
@@ -77,7 +77,7 @@ def propose(
 ) -> Proposal:  # fmt: skip
     """Look at recordings, and return the file of options that this gives."""
     from dzdesign.identify.reading.column_labels import PER_CENT, parse_columns
-    from dzdesign.identify.reading.proposed_columns import propose_columns
+    from dzdesign.identify.reading.columns import propose_columns
 
     patterns, remarks = paths_of(ramps), _Remarks()
     paths = expand(patterns) if patterns else _found_recordings()
@@ -174,7 +174,7 @@ def _pressure_table(
     remarks: _Remarks,
 ) -> tuple[dict[str, str], dict[str, tuple[str, ...]]]:
     """Return the pressure drops to declare, as declared or by names; and as what other files' names can be read."""
-    from dzdesign.identify.reading.named_pressure import pressures_in_name
+    from dzdesign.identify.reading.series import pressures_in_name
 
     if declared:
         return dict(declared) if isinstance(declared, Mapping) else dict.fromkeys(names, declared), {}
@@ -237,7 +237,7 @@ def _identified(tests: "list[RampTest]", u_max: float, guessed_dp: str, remarks:
 
 def _contradicted(tests: "Sequence[RampTest]") -> Iterator[tuple[str, str, float]]:
     """Yield recordings whose names say another pressure than was recorded, what they say, and that in MPa."""
-    from dzdesign.identify.reading.named_pressure import contradicts
+    from dzdesign.identify.reading.series import contradicts
 
     for test in tests:
         if test.dp is not None and not test.dp_is_declared:

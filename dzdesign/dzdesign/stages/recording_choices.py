@@ -97,7 +97,7 @@ def in_order(tests: "Sequence[RampTest]", paths: Sequence[Path], order: Paths | 
     InputError
         If an item is not a recording's, or a recording is missing.
     """
-    from dzdesign.identify.reading.series_order import in_stated_order
+    from dzdesign.identify.reading.series import in_stated_order
 
     if order is None:
         return list(tests)

@@ -124,9 +124,9 @@ def read_recordings(
     Refuses a file that can't be read, or has no pressure drop where [dp] names those of others. `what` is for the bar;
     `names` are those of the recordings, one a file, where they are not those of the files.
     """
-    from dzdesign.identify.reading.column_labels import MissingColumnError, parse_columns
+    from dzdesign.identify.reading.column_labels import parse_columns
     from dzdesign.identify.reading.ramp_files import read_ramp_file
-    from dzdesign.identify.reading.units_of_columns import unit_of_pressure
+    from dzdesign.identify.reading.scaling import unit_of_pressure
 
     chosen = parse_columns(columns) if columns else {}
     skipped = None if skip_rows is None else read_skip_rows(skip_rows, "--skip-rows")
@@ -136,14 +136,10 @@ def read_recordings(
     tests = []
     for path, name in with_bar(list(zip(paths, names, strict=True)), what):
         declared = _declared_dp(name, dp)
-        try:
-            test = read_ramp_file(
-                path, u_max, columns=chosen, dp=declared and parse_quantity(declared[0], "pressure", declared[1]),
-                sample_rate=rate, skip_rows=skipped, missing=read_missing(missing),
-            )  # fmt: skip
-        except MissingColumnError as error:
-            option = _with_columns(path, chosen, skipped, rate)
-            raise InputError(f"{error.what}{option}" if option else str(error)) from error
+        test = read_ramp_file(
+            path, u_max, columns=chosen, dp=declared and parse_quantity(declared[0], "pressure", declared[1]),
+            sample_rate=rate, skip_rows=skipped, missing=read_missing(missing),
+        )  # fmt: skip
         units = test.units if declared is None else {**test.units, **unit_of_pressure(declared[0])}
         tests.append(replace(test, source=name, units=units))
     _refuse_unnamed(tests, dp)
@@ -156,31 +152,13 @@ def read_recordings(
 
 def _unclear_pressures(path: Path, chosen: Mapping[str, str], skip_rows: int | None) -> str:
     """Return which columns may make the drop that a recording lacks, with what to declare; nothing if none may."""
-    from dzdesign.identify.reading.proposed_columns import propose_columns
+    from dzdesign.identify.reading.columns import propose_columns
 
     look = propose_columns(path, chosen, skip_rows, time_is_declared=True)
     if look.unclear.get("dP") or "dP" not in look.proposed:
         return look.unclear.get("dP", "")
     label = look.proposed["dP"].label
     return f"'{label}' is the only column in a unit of pressure; if it is the drop, give --columns \"dP={label}\""
-
-
-def _with_columns(path: Path, chosen: Mapping[str, str], skip_rows: int | None, rate: float | None) -> str:
-    """Return the option --columns that a file without known labels may need; nothing where its columns tell none."""
-    from dzdesign.identify.reading.proposed_columns import propose_columns
-
-    try:
-        look = propose_columns(path, chosen, skip_rows, time_is_declared=rate is not None)
-    except InputError:
-        return ""
-    if not look.to_paste:
-        return ""
-    unknown = " (LABEL: the one that you know)" if "=LABEL:" in look.to_paste else ""
-    timeless = rate is None and "time" not in look.known | look.proposed
-    clock = ', and --sample-rate "100 Hz" (the rate of your logger)' if timeless else ""
-    if timeless and look.times:
-        clock = f", and as time that of the command, for example time={look.times[0]}"
-    return f'; by their units, give --columns "{look.to_paste}"{unknown}{clock}'
 
 
 def expand(patterns: Paths) -> list[Path]:
@@ -256,9 +234,9 @@ def _refuse_unnamed(tests: list["RampTest"], declared: Table) -> None:
 def refuse_copies(tests: Sequence["RampTest"]) -> None:
     """Refuse a recording that is given twice: counting a copy as a repeat would understate the uncertainty.
 
-    The same file, or the same samples: see `copies`.
+    The same file, or the same samples: see `series`.
     """
-    from dzdesign.identify.reading.copies import find_copy
+    from dzdesign.identify.reading.series import find_copy
 
     known: dict[str, str] = {}
     for recording in tests:

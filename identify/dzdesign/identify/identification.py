@@ -21,7 +21,7 @@ from dzdesign.identify.ramps.dithered_command import without_dither
 from dzdesign.identify.ramps.sides import tests_of_side
 from dzdesign.identify.reading.low_flow_readings import readings_of_side
 from dzdesign.identify.reading.ramp_test import RampTest
-from dzdesign.identify.reading.units_of_columns import units_of
+from dzdesign.identify.reading.scaling import units_of
 from dzdesign.identify.results import Identification, SideIdentification
 from dzdesign.identify.side import identify_side
 from dzdesign.identify.valve.low_flow import LowFlow
@@ -144,10 +144,10 @@ def _each_side(
             mixed = about_mixed_pressures(of_side)
             pressures = (*mixed, *about_single_pressures(of_side, mixed))
             # At the end of its range a meter stands still as one that is stuck does.
-            of_side, side_options, clipped = without_clipping(of_side, options)
+            of_side, clipped = without_clipping(of_side, options.u_max)
             of_side, dropped = without_drop_outs(of_side)
             try:
-                sides[name] = identify_side(of_side, side_options, units.of_side(name), by_hand)
+                sides[name] = identify_side(of_side, options, units.of_side(name), by_hand)
             except InputError as error:
                 # Ramps of several pressures taken for one test may be refused for any reason: the cause is this.
                 reason = f"{error}; it may be that {mixed[0].text}" if mixed else str(error)

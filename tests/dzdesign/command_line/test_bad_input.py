@@ -96,7 +96,7 @@ def refusal(bench, capsys):
         (csv(ramp(), "time_s,u_V,dP_xyz,Q_Lmin").encode(), "column 'dP_xyz': 'xyz' is not a unit of pressure"),
         (csv(ramp(), "time_s,u_V,dP_V,Q_Lmin").encode(), "column 'dP_V': 'V' is not a unit of pressure"),
         (csv(ramp(), "time_s,comand_V,dP_MPa,Q_Lmin").encode(), "no column of u"),
-        (csv(ramp(), "time_s,comand_V,dP_MPa,Q_Lmin").encode(), "did you mean 'comand_V'"),
+        (csv(ramp(), "time_s,comand_V,dP_MPa,Q_Lmin").encode(), "u=comand_V"),
         (csv(ramp(), "time_s,u_V,u [V],Q_Lmin").encode(), "two columns of u: 'u_V' and 'u [V]'"),
         (csv(ramp(), "time_s,u_V,pA_MPa,Q_Lmin").encode(), "a column of pA but none of pB"),
         (("# bench 3\n\n" + csv(ramp()) + "1,x,3,4\n").encode(), "row 1004, column 'u_V': 'x' is not a number"),

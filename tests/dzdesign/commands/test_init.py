@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from dzdesign.command_line.cli import main
-from dzdesign.identify.reading.named_pressure import pressures_in_name
-from dzdesign.identify.reading.proposed_columns import propose_columns
+from dzdesign.identify.reading.columns import propose_columns
+from dzdesign.identify.reading.series import pressures_in_name
 from tests.support.synthetic import L_MIN, MPA, Truth, synthetic_ramp
 
 LABELS = "Zeit (s),AO0 [V],Durchfluss [L/min],Temp [degC]"

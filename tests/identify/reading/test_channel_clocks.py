@@ -11,7 +11,7 @@ import scipy.io
 from nptdms import ChannelObject, RootObject, TdmsWriter
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.reading.proposed_columns import propose_columns
+from dzdesign.identify.reading.columns import propose_columns
 from dzdesign.identify.reading.ramp_files import read_ramp_file
 
 L_MIN = 1e-3 / 60

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from dzdesign.identify.constants import L_MIN, MPA
-from dzdesign.identify.reading.copies import find_copy
 from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.reading.series import find_copy
 
 RATE = 50
 #: Steps of a 12-bit converter: 60 L/min, 20 V and 10 MPa.

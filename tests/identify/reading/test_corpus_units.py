@@ -12,7 +12,7 @@ from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.knees import meter_floor
 from dzdesign.identify.ramps import splitting
 from dzdesign.identify.ramps.staircases import find_staircase
-from dzdesign.identify.reading import columns, ramp_files, units_of_columns
+from dzdesign.identify.reading import columns, ramp_files, scaling
 from dzdesign.identify.reading.metering_edge import MeteringEdge, metering_edge
 
 CASES = {case.name: case for case in corpus_units.cases()}
@@ -52,12 +52,12 @@ def forget_the_units(monkeypatch):
 
 
 def take_a_gallon_for_the_imperial_one(monkeypatch):
-    monkeypatch.setattr(units_of_columns, "L_MIN", L_MIN * 3.785411784 / 4.54609)
+    monkeypatch.setattr(scaling, "L_MIN", L_MIN * 3.785411784 / 4.54609)
 
 
 def forget_what_is_zero(monkeypatch):
-    found = units_of_columns._command_unit
-    monkeypatch.setattr(units_of_columns, "_command_unit", lambda *args: replace(found(*args), at_zero=0.0))
+    found = scaling._command_unit
+    monkeypatch.setattr(scaling, "_command_unit", lambda *args: replace(found(*args), at_zero=0.0))
 
 
 def forget_that_a_reading_falls_on_the_negative_side(monkeypatch):
@@ -65,7 +65,9 @@ def forget_that_a_reading_falls_on_the_negative_side(monkeypatch):
 
 
 def read_a_signal_as_its_column(monkeypatch):
-    monkeypatch.setattr(units_of_columns, "read_signal_range", lambda *args, **more: None)
+    read = scaling.read_signal_range
+    seen = lambda text, name, **more: None if name == "u" else read(text, name, **more)  # noqa: E731
+    monkeypatch.setattr(scaling, "read_signal_range", seen)
 
 
 @pytest.mark.parametrize(
@@ -111,7 +113,7 @@ def test_a_ramp_in_coarse_steps_is_no_staircase():
 )
 def test_the_edge_follows_from_the_ports(recorded, positive, negative):
     edge = metering_edge(recorded.split())
-    assert (edge.at(1), edge.at(-1), edge.ambiguous) == (positive, negative, False)
+    assert (edge.positive, edge.negative, edge.ambiguous) == (positive, negative, False)
 
 
 def test_four_ports_are_ambiguous():

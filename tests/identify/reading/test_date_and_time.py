@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.reading.proposed_columns import propose_columns
+from dzdesign.identify.reading.columns import propose_columns
 from dzdesign.identify.reading.ramp_files import read_ramp_file
-from dzdesign.identify.reading.series_order import runs_back
+from dzdesign.identify.reading.series import runs_back
 from dzdesign.identify.reading.time_stamps import start_of
 from tests.identify.reading.logger_files import DP, START, TIME, Q, U, rows, stamps, text
 

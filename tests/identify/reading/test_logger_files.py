@@ -10,7 +10,7 @@ import pytest
 
 from dzdesign.command_line.cli import main
 from dzdesign.core.errors import InputError
-from dzdesign.identify.reading.proposed_columns import propose_columns
+from dzdesign.identify.reading.columns import propose_columns
 from dzdesign.identify.reading.ramp_files import read_ramp_file
 from tests.dzdesign.command_line.test_bad_input import csv
 from tests.identify.reading.logger_files import (

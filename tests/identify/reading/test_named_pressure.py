@@ -2,7 +2,7 @@
 
 import pytest
 
-from dzdesign.identify.reading.named_pressure import claimed_pressures, contradicts, pressures_in_name
+from dzdesign.identify.reading.series import claimed_pressures, contradicts, pressures_in_name
 
 
 @pytest.mark.parametrize(

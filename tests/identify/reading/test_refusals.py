@@ -126,10 +126,10 @@ REFUSED = {
     "two columns of u": (plain(table("time_s,u_V,u [V],Q_Lmin")), "row 1"),
     "pA alone": (plain(table("time_s,u_V,pA_MPa,Q_Lmin")), "row 1"),
     "pB alone": (plain(table("time_s,u_V,pB_MPa,Q_Lmin")), "row 1"),
-    "a command mistyped": (plain(table("time_s,comand_V,dP_MPa,Q_Lmin")), "'comand_V'"),
-    "a command by another name": (plain(table("time_s,voltage_V,dP_MPa,Q_Lmin")), "'voltage_V'"),
+    "a command mistyped": (plain(table("time_s,comand_V,dP_MPa,Q_Lmin")), "u=comand_V"),
+    "a command by another name": (plain(table("time_s,voltage_V,dP_MPa,Q_Lmin")), "u=voltage_V"),
     "a time mistyped": (plain(table("tme_s,u_V,dP_MPa,Q_Lmin")), ""),
-    "a flow by another name": (plain(table("time_s,u_V,dP_MPa,through_Lmin")), "'through_Lmin'"),
+    "a flow by another name": (plain(table("time_s,u_V,dP_MPa,through_Lmin")), "Q=through_Lmin"),
     # units
     "time without a unit": (plain(table("time,u,dP,Q")), "column 'time'"),
     "dP without a unit": (plain(table("time_s,u_V,dP,Q_Lmin")), "column 'dP'"),

@@ -4,13 +4,14 @@ import math
 from collections.abc import Iterator, Sequence
 
 from dzdesign.identify.constants import MPA
-from dzdesign.identify.data_quality.catalogue import Finding, warn
+from dzdesign.identify.data_quality.catalogue import warn
 from dzdesign.identify.fit.scatter import Scatter
 from dzdesign.identify.knees.between_ramps import ASSUMED_REPEATABILITY, FEW_DEGREES
 from dzdesign.identify.knees.described_tests import DescribedTest
 from dzdesign.identify.knees.scatter_checks import ScatterChecks
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.valve.bound_proof import BoundProof
+from dzdesign.identify.valve.model import Warning_
 from dzdesign.identify.valve.repeatability import Repeatability
 from dzdesign.identify.valve.side_model import SideModel
 
@@ -26,7 +27,7 @@ def about_ramps(
     checks: ScatterChecks,
     tests: Sequence[DescribedTest],
     options: IdentifyOptions,
-) -> Iterator[Finding]:
+) -> Iterator[Warning_]:
     """Yield the warnings about what differs from ramp to ramp, on the guarded branch."""
     found, proof = side.certificate.repeatability, side.curve.proof
     count = len(tests)
@@ -57,7 +58,7 @@ def _about_premises(
     tests: Sequence[DescribedTest],
     proof: BoundProof,
     u_max: float,
-) -> Iterator[Finding]:
+) -> Iterator[Warning_]:
     """Yield what the repeats say against a scatter that is normal, alike at all pressure drops, and independent."""
     alike, groups, unlike = checks.alike, checks.groups, scatter.unlike
     if groups and groups.apart > SMALLEST_DISTANCE * u_max:

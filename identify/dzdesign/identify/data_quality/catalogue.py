@@ -38,7 +38,6 @@ def catalogue() -> dict[str, Entry]:
     return msgspec.toml.decode(files(__package__).joinpath("warnings.toml").read_bytes(), type=dict[str, Entry])
 
 
-Finding = Warning_
 
 
 def warn(code: str, source: str | None = None, case: str = "", **numbers: object) -> Warning_:

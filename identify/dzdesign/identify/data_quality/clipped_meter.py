@@ -14,7 +14,6 @@ from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.data_quality.catalogue import warn
 from dzdesign.identify.knees.gated_line import UNSEEN
 from dzdesign.identify.knees.readings_at_rest import FEWEST_AT_REST, readings_at_rest
-from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.model import Warning_
 
@@ -55,29 +54,24 @@ class _Top:
         return min(self.dp, other.dp) > 0 and abs(np.log(other.dp / self.dp)) / 2 > ROOTS
 
 
-def without_clipping(
-    tests: Sequence[RampTest], options: IdentifyOptions
-) -> tuple[list[RampTest], IdentifyOptions, tuple[Warning_, ...]]:
-    """Return the recordings without what lies beyond the ends of the meter, its floor, and what to say.
+def without_clipping(tests: Sequence[RampTest], u_max: float) -> tuple[list[RampTest], tuple[Warning_, ...]]:
+    """Return the recordings without what lies beyond the ends of the meter, and what to say.
 
-    Wherever the meter was cut off below, the flow is zero; a floor that is declared stays, unless the meter was cut off
-    above it. Rows at its upper end are marked as beyond it.
+    Wherever the meter was cut off below, the flow is zero, and it is noted up to which. Rows at its upper end are
+    marked as beyond it.
     """
-    tests, beyond = _marked_upper_end(tests, options.u_max)
-    lowest = [_clipped_at(test, options.u_max) for test in tests]
-    if not any(lowest):
-        return tests, options, beyond
+    tests, beyond = _marked_upper_end(tests, u_max)
+    lowest = [_clipped_at(test, u_max) for test in tests]
     seen = [
-        replace(test, q=np.where(test.q <= low + _one_reading(test), 0.0, test.q)) if low else test
+        replace(test, q=np.where(test.q <= low + _one_reading(test), 0.0, test.q), clipped_below=low) if low else test
         for test, low in zip(tests, lowest, strict=True)
     ]
-    floor = max(options.meter_floor or 0.0, *lowest, 0.0)
     warnings = tuple(
         warn("meter-clipped", test.source, flow_L_min=low / L_MIN, rows=int(np.sum(test.q <= low + _one_reading(test))))
         for test, low in zip(tests, lowest, strict=True)
         if low
     )
-    return seen, replace(options, meter_floor=floor), (*warnings, *beyond)
+    return seen, (*warnings, *beyond)
 
 
 def _marked_upper_end(tests: Sequence[RampTest], u_max: float) -> tuple[list[RampTest], tuple[Warning_, ...]]:

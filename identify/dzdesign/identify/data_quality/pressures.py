@@ -13,8 +13,8 @@ from dzdesign.identify.constants import FULL_SWEEP, L_MIN, MPA
 from dzdesign.identify.data_quality.catalogue import warn
 from dzdesign.identify.ramps.pooling import SAME_PRESSURE
 from dzdesign.identify.ramps.splitting import SHUT
-from dzdesign.identify.reading.named_pressure import claimed_pressures, contradicts
 from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.reading.series import claimed_pressures, contradicts
 from dzdesign.identify.valve.model import Warning_
 from dzdesign.identify.valve.ramp_result import TestResult
 

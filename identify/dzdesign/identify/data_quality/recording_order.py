@@ -5,7 +5,7 @@ from itertools import pairwise
 
 from dzdesign.identify.data_quality.catalogue import warn
 from dzdesign.identify.reading.ramp_test import RampTest
-from dzdesign.identify.reading.series_order import began, ended, on_one_clock, order_is_stated, runs_back
+from dzdesign.identify.reading.series import began, ended, on_one_clock, order_is_stated, runs_back
 from dzdesign.identify.valve.model import Warning_
 
 #: A pause within a series of ramps is shorter than this, s: half a year.

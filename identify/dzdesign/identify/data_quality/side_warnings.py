@@ -7,7 +7,7 @@ import numpy as np
 
 from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.data_quality.between_ramps import about_ramps
-from dzdesign.identify.data_quality.catalogue import Finding, warn
+from dzdesign.identify.data_quality.catalogue import warn
 from dzdesign.identify.data_quality.flow_meter import about_the_meter
 from dzdesign.identify.data_quality.knee_errors import about_errors
 from dzdesign.identify.data_quality.pressures import about_flow_gains
@@ -19,6 +19,7 @@ from dzdesign.identify.knees.meter_lag import softness_of_filter
 from dzdesign.identify.knees.scatter_checks import ScatterChecks
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.sweep_pressure import SWINGS
+from dzdesign.identify.valve.model import Warning_
 from dzdesign.identify.valve.side_model import SideModel
 
 #: A softer edge than this share of u_max between knee and the tail's zero is said.
@@ -39,7 +40,7 @@ def find_warnings(
     departure: np.ndarray,
     certified: Certified,
     options: IdentifyOptions,
-) -> tuple[Finding, ...]:
+) -> tuple[Warning_, ...]:
     """Return the warnings about one side.
 
     `departure` (T,) says by how much each test's threshold departs from one direction with the pressure drop, V; zero
@@ -73,7 +74,7 @@ def find_warnings(
     )
 
 
-def _about_premises(side: SideModel, certified: Certified) -> Iterator[Finding]:
+def _about_premises(side: SideModel, certified: Certified) -> Iterator[Warning_]:
     refused, taken = certified.refused, side.curve.premise
     if refused:
         yield warn("premise-refused", premise=refused.premise, p=refused.lack_of_fit_p or 0.0, taken=taken)
@@ -83,7 +84,7 @@ def _checks(side: SideModel, group: DescribedTests) -> ScatterChecks:
     return group.between(1 if side.certificate.guard == "closing" else 0).checks
 
 
-def _about_hysteresis(side: SideModel, group: DescribedTests, u_max: float) -> Iterator[Finding]:
+def _about_hysteresis(side: SideModel, group: DescribedTests, u_max: float) -> Iterator[Warning_]:
     """Say of a wide hysteresis whether it may be the meter's lag: on ramps of one rate both look alike."""
     gaps = [(test.u_knee_rising_V or 0.0) - (test.u_knee_falling_V or math.inf) for test in side.tests]
     widest = int(np.argmax(gaps))
@@ -99,7 +100,7 @@ def _about_hysteresis(side: SideModel, group: DescribedTests, u_max: float) -> I
         yield warn("hysteresis", side.tests[widest].source, "one-rate", **lag, **numbers)
 
 
-def _about_pressure(side: SideModel, tests: tuple[DescribedTest, ...]) -> Iterator[Finding]:
+def _about_pressure(side: SideModel, tests: tuple[DescribedTest, ...]) -> Iterator[Warning_]:
     if side.reference.dp_MPa is None:
         yield warn("no-pressure", side.tests[0].source)
     elif len(side.tests) == 1:
@@ -116,7 +117,7 @@ def _about_pressure(side: SideModel, tests: tuple[DescribedTest, ...]) -> Iterat
             yield warn("declared-pressure", item.test.source, "declared")
 
 
-def _about_swings(tests: tuple[DescribedTest, ...]) -> Iterator[Finding]:
+def _about_swings(tests: tuple[DescribedTest, ...]) -> Iterator[Warning_]:
     """Say of a supply that swings while the valve is shut that it does: the flow follows, and no spool makes it."""
     swings = [_swing(item) for item in tests]
     worst = int(np.argmax(swings))
@@ -150,7 +151,7 @@ def _sag(item: DescribedTest) -> float:
     return 1 - float(np.median(test.dp[test.u >= 0.97 * test.u.max()])) / item.dp
 
 
-def _about_the_edge(side: SideModel, group: DescribedTests, u_max: float) -> Iterator[Finding]:
+def _about_the_edge(side: SideModel, group: DescribedTests, u_max: float) -> Iterator[Warning_]:
     floor = group.floor / L_MIN
     if floor > 0 and side.certificate.unseen_below_L_min >= floor:
         yield warn("onset-hidden", floor_L_min=floor)

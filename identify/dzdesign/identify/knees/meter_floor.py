@@ -8,7 +8,9 @@ import numpy as np
 from dzdesign.identify.knees.level_floor import floor_of_levels
 from dzdesign.identify.knees.noise import robust_sigma
 from dzdesign.identify.knees.profile import crossing, flow_at_top, hole_within, smooth_profile
+from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.branches import Branch
+from dzdesign.identify.reading.ramp_test import RampTest
 
 #: Fewest samples of a ramp between 12 % and 50 % of its largest flow that tell how fast it sweeps the flows: by itself,
 #: and beside others.
@@ -29,6 +31,12 @@ class _NearOpening:
     #: Flow that noise does not feign.
     lowest: float
     profile: tuple[np.ndarray, np.ndarray]
+
+
+def known_floor(tests: Sequence[RampTest], options: IdentifyOptions) -> float | None:
+    """Return the floor, m³/s, that is declared, or below which a meter was cut off; None if nobody knows one."""
+    clipped = max((test.clipped_below for test in tests), default=0.0)
+    return max(options.meter_floor or 0.0, clipped) if clipped else options.meter_floor
 
 
 def find_meter_floor(branches: Sequence[Branch], u_max: float) -> float:

@@ -22,6 +22,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.identify.constants import FULL_SWEEP
 from dzdesign.identify.knees.gated_line import fit_line, prepare_branch
 from dzdesign.identify.knees.line_fitting import lay_line
+from dzdesign.identify.knees.meter_floor import known_floor
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.pooling import group_by_pressure
 from dzdesign.identify.ramps.splitting import Ramp
@@ -175,8 +176,9 @@ def _knees(group: Sequence[Ramp], rising: bool, options: IdentifyOptions) -> tup
         and branch.u.max() >= FULL_SWEEP * highest
         and np.ptp(branch.u) >= FULL_SWEEP * highest
     ]
+    floor = known_floor([ramp.test for ramp in group], options) or 0.0
     for ramp, branch in whole if _two_rates([branch.rate for _, branch in whole]) else ():
-        read = prepare_branch(branch, ramp.test, u_max=options.u_max, floor=options.meter_floor or 0.0)
+        read = prepare_branch(branch, ramp.test, u_max=options.u_max, floor=floor)
         with suppress(InputError):
             line = lay_line(read, options.knee_window)
             if line.slope > 0:

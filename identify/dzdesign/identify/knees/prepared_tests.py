@@ -14,7 +14,7 @@ from dzdesign.identify.knees.branch_shape import BranchShape
 from dzdesign.identify.knees.characteristic import describe_branches
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
 from dzdesign.identify.knees.gated_line import prepare_branch
-from dzdesign.identify.knees.meter_floor import find_meter_floor
+from dzdesign.identify.knees.meter_floor import find_meter_floor, known_floor
 from dzdesign.identify.knees.meter_lag import MeterLag, find_lag
 from dzdesign.identify.knees.mixed_branches import refuse_mixed_branches
 from dzdesign.identify.knees.profile import largest_at_top
@@ -35,8 +35,8 @@ from dzdesign.identify.ramps.splitting import Ramp, dp_under_flow, nominal_dp, s
 from dzdesign.identify.ramps.sweep_pressure import NO_PRESSURE
 from dzdesign.identify.reading.column_labels import PER_CENT
 from dzdesign.identify.reading.ramp_test import RampTest
-from dzdesign.identify.reading.series_order import with_clock_of_series
-from dzdesign.identify.reading.units_of_columns import units_of
+from dzdesign.identify.reading.scaling import units_of
+from dzdesign.identify.reading.series import with_clock_of_series
 from dzdesign.identify.valve.left_out import left_out_in_words
 
 logger = logging.getLogger(__name__)
@@ -69,7 +69,8 @@ def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> Descr
     for line in left_out_in_words(left_out, units_of(tests)):
         logger.info("%s", line)
     _refuse_what_shows_no_dead_zone(pooled, options)
-    floor = options.meter_floor if options.meter_floor is not None else found_floor(pooled, options)
+    known = known_floor(tests, options)
+    floor = found_floor(pooled, options) if known is None else known
     described = _described(pooled, floor, lag, options)
     refuse_mixed_branches(described, tests)
     between = [_between_ramps(described, column, options) for column in (0, 1)]

@@ -15,7 +15,7 @@ import numpy as np
 from dzdesign.identify.knees.noise import robust_sigma
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.medians import median
-from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.reading.ramp_test import RampTest, once_a_recording
 
 #: Commands within this share of u_max are at rest; a wider one is taken where so few readings would be left.
 AT_REST, FEWEST_AT_REST = (0.01, 0.03, 0.1), 20
@@ -196,6 +196,7 @@ def _leak(growth: _Growth | None, levels: Sequence[_Rest], largest: float) -> fl
     return growth.per_Pa if growth.explained >= EXPLAINED and stands_out and worth_it else 0.0
 
 
+@once_a_recording
 def readings_at_rest(test: RampTest, u_max: float) -> np.ndarray:
     """Return which readings are taken where the command rests, in order; fewer than `FEWEST_AT_REST` if nowhere.
 
@@ -226,6 +227,7 @@ def _after_flow(at_rest: np.ndarray, flowing: np.ndarray) -> np.ndarray:
     return at_rest & after[stretch] if begins.size else at_rest
 
 
+@once_a_recording
 def moved_at_rest(test: RampTest, u_max: float) -> np.ndarray:
     """Return in which samples flow passes while the command rests that it did not leave behind: another solenoid's.
 

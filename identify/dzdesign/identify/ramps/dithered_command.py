@@ -24,7 +24,8 @@ def without_dither(test: RampTest, dither: Dither | None, u_max: float) -> RampT
     if test.u.size < SAMPLES:
         return test
     if dither is None:
-        return replace(test, undeclared_dither=_two_valued(test.u - _running_mean(test.u, SAMPLES), u_max))
+        peak = _two_valued(test.u - _running_mean(test.u, SAMPLES), u_max)
+        return replace(test, undeclared_dither=peak) if peak else test
     step = float(np.median(np.diff(test.time)))
     waves = round(WAVES / (dither.frequency_Hz * step)) if step > 0 else 0
     length = max(SAMPLES, min(waves, test.u.size)) // 2 * 2 + 1

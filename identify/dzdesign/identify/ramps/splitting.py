@@ -40,7 +40,7 @@ from dzdesign.identify.ramps.sweep_pressure import (
     swings_about,
     why_no_ramp,
 )
-from dzdesign.identify.reading.ramp_test import RampTest, despiked
+from dzdesign.identify.reading.ramp_test import RampTest, despiked, once_a_recording
 from dzdesign.identify.valve.left_out import LeftOut
 
 #: The valve is shut, and the pressure drop nominal, below this share of the range.
@@ -261,6 +261,7 @@ def _between_ends(u: np.ndarray) -> np.ndarray:
     return between
 
 
+@once_a_recording
 def nominal_dp(test: RampTest) -> float | None:
     """Return the pressure drop at (almost) no flow, Pa; None if it is unknown.
 
@@ -278,6 +279,7 @@ def nominal_dp(test: RampTest) -> float | None:
     return median(shut)
 
 
+@once_a_recording
 def dp_under_flow(test: RampTest) -> float | None:
     """Return the pressure drop where the flow is largest, of whatever sign, Pa; None if it is unknown."""
     if test.dp is None:

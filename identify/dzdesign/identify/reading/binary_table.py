@@ -31,6 +31,7 @@ from dzdesign.core.processes import end_with, interrupts_kept_waiting, safe_path
 from dzdesign.identify.reading import formats
 from dzdesign.identify.reading.formats.file_format import NO_NUMBERS_UNIT, NUMBER_KINDS, FileColumn, FileFormat
 from dzdesign.identify.reading.table import QUOTED_CHARACTERS, Table, numbered, unreadable
+from dzdesign.identify.reading.text_file import read_text_table
 from dzdesign.identify.reading.time_stamps import Start, start_of
 
 if TYPE_CHECKING:
@@ -125,6 +126,22 @@ def format_of(start: bytes, path: Path) -> FileFormat | None:
         if start.startswith(item.mark) if item.mark else path.suffix.lower() == item.suffix:
             return item
     return None
+
+
+def read_table(
+    file: BinaryIO, path: Path, skip_rows: int | None = None, missing: Collection[str] = ()
+) -> Table:
+    """Read a table of any known format; its first bytes tell which, not its name.
+
+    Raises
+    ------
+    InputError
+        If it is none of these, or not a whole one.
+    """
+    start = file.read(LONGEST_MARK)
+    file.seek(0)
+    kind = format_of(start, path)
+    return read_binary_table(file, path, kind) if kind else read_text_table(file, path, skip_rows, missing)
 
 
 def read_binary_table(file: BinaryIO, path: Path, file_format: FileFormat) -> ArrayTable:

@@ -6,21 +6,15 @@ a flow that is 0.24 s late moves a threshold by 80 mV. Nothing is extrapolated, 
 
 import logging
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import final
+from dataclasses import replace
 
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.reading.clock import ClockColumns, never_back, read_times_of_day
+from dzdesign.identify.reading.clock import SAME, Clock, ClockColumns, never_back, read_clock
 from dzdesign.identify.reading.column_labels import Column
-from dzdesign.identify.reading.missing_values import without_placeholders
-from dzdesign.identify.reading.scaling import scaling_of
 from dzdesign.identify.reading.table import AND, Table
-from dzdesign.identify.reading.time_stamps import DAY, Start, start_of
 
-#: Clocks are one where no sample is off by this share of a step: the jitter of a clock.
-SAME = 1e-3
 #: Two times of one row are one where their usual difference is within this share of a step: the last digit of one.
 ROUNDED = 0.1
 #: A column that may be a time or not is one if it goes as far, within this share.
@@ -37,44 +31,10 @@ LOST = 0.1
 logger = logging.getLogger(__name__)
 
 
-@final
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Clock:
-    """The times of a channel, in s, NaN where one is missing, and from when they count.
-
-    `stamp` is the date and time of zero; without a date, `of_day` is its time of day.
-    """
-
-    label: str
-    seconds: np.ndarray
-    stamp: Start | None
-    of_day: float | None = None
-
-    @property
-    def step(self) -> float:
-        """The usual step."""
-        steps = np.diff(self.seconds[np.isfinite(self.seconds)])
-        steps = steps[steps > 0]
-        return float(np.median(steps)) if steps.size else 0.0
-
-    def is_the_same(self, other: "Clock") -> bool:
-        """Tell whether two clocks have the same numbers, whatever they count from."""
-        one, its = self.seconds, other.seconds
-        return one.size == its.size and bool(np.all(np.abs(one - its)[np.isfinite(one - its)] <= SAME * self.step))
-
-    def ahead_of(self, other: "Clock") -> float | None:
-        """Return by how much later the zero of this clock is than that of another, s; None if nobody knows."""
-        if self.stamp and other.stamp and self.stamp.has_zone == other.stamp.has_zone:
-            return round(self.stamp.seconds - other.stamp.seconds, 5)  # a float of seconds since year 1 has no more
-        if self.of_day is not None and other.of_day is not None:
-            return (self.of_day - other.of_day + DAY / 2) % DAY - DAY / 2
-        counted = (self.stamp, self.of_day, other.stamp, other.of_day)
-        return 0.0 if counted == (None,) * 4 else None
-
-
 def lay_on_one_clock(
-    table: Table, found: Mapping[str, Column], data: dict[str, np.ndarray], u_max: float, *, time_is_chosen: bool
-) -> None:
+    table: Table, found: Mapping[str, Column], data: dict[str, np.ndarray], reference: Clock, u_max: float,
+    *, time_is_chosen: bool,
+) -> None:  # fmt: skip
     """Lay the channels that have a clock of their own on the command's, in place; NaN where there is no reading.
 
     With `time_is_chosen` the user has named the column of time, which then goes for all that has none of its own.
@@ -84,15 +44,10 @@ def lay_on_one_clock(
     InputError
         If clocks differ and have no common zero, or no time in common; if one goes back.
     """
-    if "time" not in found:
-        return
     time = found["time"]
-    reference = _clock(table, time, u_max, data["time"])
     clocks = ClockColumns(table)
-    _refuse_an_unclear_one(table, clocks, found, reference, u_max)
-    if not time_is_chosen:
-        _refuse_another_time(table, clocks, found, reference, u_max)
-    others = {column.clock.label: _clock(table, column.clock, u_max) for column in found.values() if column.clock}
+    _refuse_another_time(table, clocks, found, reference, u_max, time_is_chosen=time_is_chosen)
+    others = {column.clock.label: read_clock(table, column.clock, u_max) for column in found.values() if column.clock}
     differ = False
     for quantity, column in found.items():
         if column.clock is None:
@@ -115,19 +70,6 @@ def lay_on_one_clock(
             f"'{table.path}': '{clockless[0]}' states no time of its own, and the clocks of the other channels differ; "
             "export every channel with its start and step"
         )
-
-
-def _clock(table: Table, column: Column, u_max: float, seconds: np.ndarray | None = None) -> Clock:
-    """Return a column of time as a clock; `seconds` are its times, where they were read before."""
-    if not table.is_clock(column.label):
-        if seconds is None:
-            seconds, _ = without_placeholders(table.numbers(column.label), rises=True)
-            seconds = seconds * scaling_of(table.path, "time", column, u_max).gain if column.unit else seconds
-        return Clock(label=column.label, seconds=seconds, stamp=table.started(column.label))
-    seconds, stamp = read_times_of_day(table, column.label)
-    known = np.flatnonzero(np.isfinite(seconds))
-    day = start_of(f"2000-01-01 {table.cell(column.label, int(known[0]))}") if known.size and not stamp else None
-    return Clock(label=column.label, seconds=seconds, stamp=stamp, of_day=day.seconds % DAY if day else None)
 
 
 def _laid(
@@ -165,46 +107,27 @@ def _laid(
     return laid
 
 
-def _refuse_an_unclear_one(
-    table: Table, clocks: ClockColumns, found: Mapping[str, Column], reference: Clock, u_max: float
-) -> None:
-    """Refuse a channel without a time of its own beside a time that no channel claims and that differs."""
-    time = found["time"]
-    alone = [each.label for name, each in found.items() if name != "time" and not clocks.of(name, each.label)]
-    if table.clocks or not alone or time.label not in table.labels:
-        return
-    claimed = {clocks.of("", label) for label in table.labels}
-    claimed |= {column.clock.label for column in found.values() if column.clock}
-    for label in clocks.labels:
-        if label == time.label or label in claimed or not clocks.are_alike(time.label, label):
-            continue
-        other = _clock(table, Column(label=label, unit=time.unit), u_max)
-        if not other.is_the_same(reference):
-            begin = other.seconds[:1] - reference.seconds[:1]
-            raise InputError(
-                f"'{table.path}' has times '{time.label}' and '{label}' that differ, by {float(begin[0]):.6g} s at "
-                f"first, and which is that of '{alone[-1]}' can't be told; put each directly before its quantity, "
-                "or name them t_u_s, t_Q_s"
-            )
-
-
 def _refuse_another_time(
-    table: Table, clocks: ClockColumns, found: Mapping[str, Column], reference: Clock, u_max: float
-) -> None:
+    table: Table, clocks: ClockColumns, found: Mapping[str, Column], reference: Clock, u_max: float,
+    *, time_is_chosen: bool,
+) -> None:  # fmt: skip
     """Refuse a second time that no channel claims and that differs: which channels were sampled by it is not known.
 
-    It rises from row to row, and has times in common. One from another zero, such as an uptime, tells nothing.
+    Either it is labelled as the first one is, or it rises from row to row and has times in common with it: one from
+    another zero, such as an uptime, tells nothing. Where the time was chosen the first kind is refused only.
     """
     time, claimed = found["time"], {clocks.of("-", label) for label in table.labels}
     claimed |= {each.clock.label for each in found.values() if each.clock} | set(time.label.split(AND))
     alone = [each.label for name, each in found.items() if name not in ("time", "u") and not each.clock]
     for label in table.labels if alone and not table.clocks else ():
-        beside = label not in claimed and table.length(label) == reference.seconds.size
-        column = clocks.counted(label) if beside else None
-        if column is None or table.is_clock(label) != table.is_clock(time.label):
+        alike = clocks.are_alike(time.label, label)
+        column = clocks.counted(label) if label not in claimed and (alike or not time_is_chosen) else None
+        if column is None or table.length(label) != reference.seconds.size:
             continue
         try:
-            clock = _clock(table, column if column.unit else replace(column, unit=time.unit), u_max)
+            if table.is_clock(label) != table.is_clock(time.label):
+                continue
+            clock = read_clock(table, column if column.unit else replace(column, unit=time.unit), u_max)
         except InputError:  # text, or a time that can't be read
             continue
         its = clock.seconds + (clock.ahead_of(reference) or 0.0)
@@ -213,12 +136,13 @@ def _refuse_another_time(
         rises = its.size > 1 and np.all(np.diff(its) > 0) and its[0] <= ours[-1] and its[-1] >= ours[0]
         if not column.unit:  # it may be a temperature, or the number of the row
             rises = rises and abs(np.ptp(its) - np.ptp(ours)) <= ALIKE_SPANS * np.ptp(ours)
-        if rises and abs(float(np.median(its - ours))) > ROUNDED * reference.step:
+        far = rises and abs(float(np.median(its - ours))) > ROUNDED * reference.step
+        if far or (alike and its.size and not clock.is_the_same(reference)):
+            choose = "" if alike else f', or choose one for all: --columns "time={time.label}"'
             raise InputError(
                 f"'{table.path}' has times '{time.label}' and '{label}' that differ, by {its[0] - ours[0]:.6g} s at "
                 f"first and {its[-1] - ours[-1]:.6g} s at last, and which is that of '{alone[-1]}' can't be told; name "
-                "each by its quantity, such as t_u_s and t_Q_s, or choose one for all: --columns "
-                f'"time={time.label}"'
+                f"each by its quantity, such as t_u_s and t_Q_s{choose}"
             )
 
 

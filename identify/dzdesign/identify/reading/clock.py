@@ -2,8 +2,10 @@
 
 import logging
 import re
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
 from typing import final
 
 import numpy as np
@@ -18,9 +20,13 @@ from dzdesign.identify.reading.column_labels import (
     quantity_named,
     split_label,
 )
+from dzdesign.identify.reading.missing_values import Missing, without_placeholders
+from dzdesign.identify.reading.scaling import in_SI, no_unit, scaling_of
 from dzdesign.identify.reading.table import Table, clean_label
-from dzdesign.identify.reading.time_stamps import DAY, MIDNIGHT, Start
+from dzdesign.identify.reading.time_stamps import DAY, MIDNIGHT, Start, start_of
 
+#: Clocks are one where no sample is off by this share of a step: the jitter of a clock.
+SAME = 1e-3
 #: A column of time, and the quantity that it may name before or behind: Time, t_u, X_Value, time of Q, Flow Time.
 CLOCK_OF = re.compile(
     r"((?i:time[ _]?stamp|time|zeit|x_?value)|[tT])(?:[\s_.:-]+|(?=[A-Z0-9]|d[pP]|$))(?:(?:of|for)\s)?(.*)"
@@ -171,6 +177,72 @@ def _name_and_unit(table: Table, label: str) -> tuple[str, str]:
     return bare, table.units.get(label, "")
 
 
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Clock:
+    """The times of a channel, in s, NaN where one is missing, and from when they count.
+
+    `stamp` is the date and time of zero; without a date, `of_day` is its time of day. Without a unit the numbers are as
+    they stand in the file.
+    """
+
+    label: str
+    seconds: np.ndarray
+    stamp: Start | None
+    of_day: float | None = None
+    #: It counts, and is no column of dates or times of day; whether its unit is known.
+    counts: bool = False
+    has_unit: bool = True
+    missing: Missing = field(default_factory=Missing)
+
+    @property
+    def step(self) -> float:
+        """The usual step."""
+        return _usual_step(self.seconds[np.isfinite(self.seconds)])
+
+    def is_the_same(self, other: "Clock") -> bool:
+        """Tell whether two clocks have the same numbers, whatever they count from."""
+        one, its = self.seconds, other.seconds
+        return one.size == its.size and bool(np.all(np.abs(one - its)[np.isfinite(one - its)] <= SAME * self.step))
+
+    def ahead_of(self, other: "Clock") -> float | None:
+        """Return by how much later the zero of this clock is than that of another, s; None if nobody knows."""
+        if self.stamp and other.stamp and self.stamp.has_zone == other.stamp.has_zone:
+            return round(self.stamp.seconds - other.stamp.seconds, 5)  # a float of seconds since year 1 has no more
+        if self.of_day is not None and other.of_day is not None:
+            return (self.of_day - other.of_day + DAY / 2) % DAY - DAY / 2
+        counted = (self.stamp, self.of_day, other.stamp, other.of_day)
+        return 0.0 if counted == (None,) * 4 else None
+
+
+def read_clock(table: Table, column: Column, u_max: float, no_numbers: Sequence[float] = ()) -> Clock:
+    """Return a column of time; `no_numbers` stand for no value.
+
+    Raises
+    ------
+    InputError
+        If it is none, or nobody knows in what its numbers are.
+    """
+    label = column.label
+    if table.is_clock(label):
+        seconds, stamp = read_times_of_day(table, label)
+        known = np.flatnonzero(np.isfinite(seconds))
+        day = start_of(f"2000-01-01 {table.cell(label, int(known[0]))}") if known.size and not stamp else None
+        of_day = day.seconds % DAY if day else None
+        return Clock(label=label, seconds=seconds, stamp=stamp, of_day=of_day, missing=_marked(table, label))
+    numbers, placeholders = without_placeholders(table.numbers(label), rises=True, declared=no_numbers)
+    if column.unit or not may_count_ms(numbers):  # else the whole recording tells what they count
+        numbers = in_SI(table, "time", column, numbers, scaling_of(table.path, "time", column, u_max))
+    return Clock(
+        label=label, seconds=numbers, stamp=table.started(label), counts=True, has_unit=bool(column.unit),
+        missing=_marked(table, label) + placeholders,
+    )  # fmt: skip
+
+
+def _marked(table: Table, label: str) -> Missing:
+    return table.marked.get(label, Missing())
+
+
 def read_times_of_day(table: Table, label: str) -> tuple[np.ndarray, Start | None]:
     """Return the seconds since the first row, of a column of dates or times of day, and when that was.
 
@@ -258,19 +330,21 @@ def never_back(table: Table, time: np.ndarray, complete: np.ndarray) -> np.ndarr
     return latest
 
 
-def clock_doubt(time: np.ndarray, u: np.ndarray, *, unit_stated: bool) -> str:
-    """Return what is doubtful about the unit of a clock that `may_count_ms`: one of the two above, or nothing.
+def doubt_of_clock(path: Path, clock: Clock, read: np.ndarray, time: np.ndarray, u: np.ndarray) -> str:
+    """Return what is doubtful about the unit of a clock: one of the two above, or nothing; refuse one without a unit.
 
-    That it is in ms is plain where a ramp would take longer than any does in seconds, and takes long enough in
+    `read` are the times of all rows; `time` and `u` what is left of them after thinning, in s where a unit is stated.
+    That the clock is in ms is plain where a ramp would take longer than any does in seconds, and takes long enough in
     milliseconds.
-
-    The time is as read, in s where a unit is stated.
     """
-    size = np.abs(u)
-    level = np.where(size > HIGH * size.max(), 1, np.where(size < LOW * size.max(), -1, 0))
-    level = level[level != 0]
-    ramps = int(np.count_nonzero(np.diff(level)))
-    a_ramp = float(time[-1] - time[0]) / max(ramps, 1)
-    if not (ramps > 0 and a_ramp > LONGEST_RAMP and a_ramp / 1000 > SHORTEST_RAMP):
-        return ""
-    return LIKE_MS if unit_stated else ASSUMED_MS
+    doubt = ""
+    if clock.counts and may_count_ms(read, longest_step=np.inf):
+        size = np.abs(u)
+        level = np.where(size > HIGH * size.max(), 1, np.where(size < LOW * size.max(), -1, 0))
+        ramps = int(np.count_nonzero(np.diff(level[level != 0])))
+        a_ramp = float(time[-1] - time[0]) / max(ramps, 1)
+        is_long = ramps > 0 and a_ramp > LONGEST_RAMP and a_ramp / 1000 > SHORTEST_RAMP
+        doubt = (LIKE_MS if clock.has_unit else ASSUMED_MS) if is_long else ""
+    if not clock.has_unit and doubt != ASSUMED_MS:
+        raise no_unit(path, "time", clock.label)
+    return doubt

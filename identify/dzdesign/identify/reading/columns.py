@@ -1,36 +1,62 @@
-"""Which column of a table is which quantity: by its label, or by the engineer's word."""
+"""The columns of a recording that its reader takes; or how they may be read, for a person who has yet to declare them.
+
+The reader's own recognition goes first; a quantity whose label it does not know is the only column in a unit of it.
+"""
 
 import re
-from collections.abc import Collection, Mapping
-from dataclasses import replace
-from difflib import get_close_matches
+from collections.abc import Collection, Iterable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from itertools import combinations
+from pathlib import Path
 
-from dzdesign.core.errors import InputError
+import numpy as np
+
+from dzdesign.core.documents import open_bytes
+from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.units import measures
-from dzdesign.identify.reading.clock import ClockColumns
+from dzdesign.identify.reading.binary_table import read_table
+from dzdesign.identify.reading.clock import ClockColumns, is_milliseconds
 from dzdesign.identify.reading.column_labels import (
     COLUMN_NAMES,
-    EXAMPLE_LABELS,
     EXAMPLE_UNITS,
-    LONGEST_NAME,
+    LESS,
     MOST_MEANT,
     PRESSURES,
     QUANTITY_OF_COLUMN,
     Column,
-    MissingColumnError,
     fits,
+    labelled_columns,
     long_format,
-    names_a_quantity_or_current,
+    names_a_quantity,
     no_flow,
     same_unit,
     split_column,
     split_label,
 )
-from dzdesign.identify.reading.metering_edge import gauge_beside_absolute, metering_edge, which_edge
-from dzdesign.identify.reading.table import AND, Table, clean_label
+from dzdesign.identify.reading.metering_edge import (
+    PORTS,
+    MeteringEdge,
+    gauge_beside_absolute,
+    metering_edge,
+    which_edge,
+)
+from dzdesign.identify.reading.scaling import range_example, scaling_of
+from dzdesign.identify.reading.table import Table
 
-#: Stands between the commands of two solenoids whose difference is the signed command.
-LESS = re.compile(r"\s[-\u2212\u2013]\s")
+#: A label that may be a pressure's, and has no unit: p1, P_in, Druck A, but neither pos nor PWM.
+PRESSURE_LIKE = re.compile(
+    r"(?:[dΔδ]|delta|diff)?[\s_.-]?p[\s_.-]?(?:[abpst]|in|out|\d{1,2})?|[^\[(]{0,20}(?:press|druck)[^\[(]{0,20}",
+    re.IGNORECASE,
+)
+#: A label that may be of a command as a share: duty, Duty_cycle, PWM, Tastgrad, Tastverhältnis.
+DUTY_LIKE = re.compile(r"\bduty|_duty|pwm|tast(?:grad|verh)", re.IGNORECASE)
+#: Counts of a command that has no unit are fewer.
+LARGEST_COMMAND = 1e6
+#: A solenoid is driven above this share of its largest command; of two, both in so few rows, over those of either.
+DRIVEN, BOTH = 0.1, 0.01
+#: Columns among which two solenoids' are looked for.
+MOST_COMMANDS = 6
 
 
 def find_columns(table: Table, chosen: Mapping[str, str], sample_rate: float | None = None) -> dict[str, Column]:
@@ -68,7 +94,7 @@ def find_columns(table: Table, chosen: Mapping[str, str], sample_rate: float | N
     several = sample_rate is None and (table.clocks or len(clocks.labels) > 1)
     for quantity in ("u", "time", "Q") if several else ("time", "u", "Q") if sample_rate is None else ("u", "Q"):
         if quantity not in columns:
-            raise _missing_column(quantity, table, columns, clocks)
+            raise _missing_column(quantity, table, chosen, columns, clocks, time_is_declared=sample_rate is not None)
     return columns if sample_rate is not None else _with_own_clocks(table, columns, clocks)
 
 
@@ -77,12 +103,11 @@ def _with_own_clocks(table: Table, columns: dict[str, Column], clocks: ClockColu
     time = columns["time"]
     for quantity, column in columns.items():
         own = clocks.of(quantity, column.label) if quantity != "time" else ""
-        for less in filter(None, (column.less,)):
-            if clocks.of(quantity, less.label) != own:
-                raise InputError(
-                    f"'{table.path}': '{column.label}' and '{less.label}' have clocks of their own, and no difference "
-                    "of the two is taken; export the commands with one"
-                )
+        if column.less and clocks.of(quantity, column.less.label) != own:
+            raise InputError(
+                f"'{table.path}': '{column.label}' and '{column.less.label}' have clocks of their own, and no "
+                "difference of the two is taken; export the commands with one"
+            )
         if not own or time.label in (own, table.dated(own)):
             continue
         if quantity == "u":
@@ -113,137 +138,316 @@ def _without_time(
     return {quantity: column for quantity, column in columns.items() if quantity != "time"}
 
 
-def labelled_columns(table: Table, chosen: Mapping[str, str], clocks: ClockColumns) -> dict[str, Column]:
-    """Return what `find_columns` does, without a word on quantities that have no column."""
-    equal, unit = _label_and_unit(table, chosen.get("time", ""))
-    if equal not in table.labels and any(table.in_file(label) == equal for label in table.labels):
-        # Of equal columns of time the command's is meant, if it has one of them.
-        others = {name: text for name, text in chosen.items() if name != "time"}
-        columns = labelled_columns(table, others, clocks)
-        if "time" in columns and table.in_file(columns["time"].label) == equal:
-            return columns | {"time": replace(columns["time"], unit=unit or columns["time"].unit)}
-    columns = {quantity: _chosen_column(table, quantity, label) for quantity, label in chosen.items()}
-    taken = {each.label for column in columns.values() for each in column.every}
-    edge = metering_edge(chosen)
-    pressures = set(PRESSURES) if edge.ambiguous or edge.quantities else set()
-    also_time = ""
-    for label in table.labels:
-        quantity, in_label = split_column(table, label)
-        if quantity is None or label in taken or quantity in chosen.keys() | pressures:
-            continue
-        is_unit = in_label and (fits(in_label, quantity) or label not in table.units)
-        unit = in_label if is_unit else table.units.get(label, "")
-        unit = "s" if quantity == "time" and not fits(unit, "time") and table.is_clock(label) else unit
-        if quantity in columns and not fits(unit, quantity):
-            continue  # an oil temperature T_degC beside the time t_s, a set point Q_set beside Q_Lmin
-        if quantity in ("pP", "pT", "time") and unit and not fits(unit, quantity):
-            continue  # a thermometer Pt_degC or T_degC
-        if quantity == "time" and "time" in columns and fits(columns["time"].unit, "time"):
-            also_time = label
-            continue
-        if quantity in columns and fits(columns[quantity].unit, quantity):
-            raise InputError(
-                f"'{table.path}'{table.header} has two columns of {quantity}: '{columns[quantity].label}' and "
-                f"'{label}'; choose one, for example --columns \"{quantity}={label}\""
-            )
-        _refuse_two_units(table, quantity, label, in_label)
-        columns[quantity] = Column(label=table.dated(label) if quantity == "time" else label, unit=unit)
-    if "time" not in chosen and "u" in columns and (clock := clocks.of("u", columns["u"].label)):
-        columns["time"] = clocks.column(clock)
-    elif also_time and "u" in columns:
-        raise InputError(
-            f"'{table.path}'{table.header} has columns of time '{columns['time'].label}' and '{also_time}', and which "
-            f"is that of '{columns['u'].label}' can't be told; name them by their quantity, such as t_u_s and t_Q_s, "
-            "or choose one by --columns"
-        )
-    elif also_time:
-        del columns["time"]  # the command will tell which it is
-    return columns
-
-
-def _chosen_column(table: Table, quantity: str, text: str) -> Column:
-    """Return the column that was chosen: the whole text is its label, or else what stands before the last colon."""
-    if quantity == "time" and (pair := table.pair(text)):
-        return Column(label=AND.join(pair), unit="s")
-    label, unit = _label_and_unit(table, text)
-    if quantity == "u" and label not in table.labels and (two := _two_solenoids(table, text)):
-        column, less = (_chosen_column(table, quantity, each) for each in two)
-        if " ".join(column.unit.split()) != " ".join(less.unit.split()) and not same_unit(column.unit, less.unit, "u"):
-            raise InputError(
-                f"'{table.path}': '{column.label}' is in '{column.unit}', '{less.label}' in '{less.unit}'; give both "
-                f'one unit, for example --columns "u={column.label} - {less.label}:{column.unit}"'
-            )
-        return replace(column, less=less)
-    if label not in table.labels:
-        raise table.no_column(label, f"--columns names for {quantity}", quantity)
-    _, in_label = split_column(table, label)
-    bracketed = bool(re.search(r"[\[(]", label))
-    stated = (in_label if bracketed or names_a_quantity_or_current(in_label) else "") or table.units.get(label, "")
-    if not unit:
-        _refuse_two_units(table, quantity, label, in_label)
-    unit = unit or (in_label if bracketed or fits(in_label, quantity) else "") or table.units.get(label, "")
-    if quantity == "time" and not fits(unit, "time") and table.is_clock(label):
-        unit = "s"
-    if not unit:
-        if quantity == "Q" and (other := no_flow([label])):
-            raise InputError(f"'{table.path}'{other.replace(';', ':', 1)}")
-        raise InputError(
-            f"'{table.path}' column '{label}' has no unit; write for example "
-            f'--columns "{quantity}={label}:{EXAMPLE_UNITS[quantity]}"'
-            + (f', or what its numbers mean, --columns "u={label}:0..1 = 0..100 %"' if quantity == "u" else "")
-        )
-    return Column(label=label, unit=unit, stated=stated)
-
-
-def _label_and_unit(table: Table, text: str) -> tuple[str, str]:
-    """Return a column's label and the unit behind it; of a single column ``LABEL#1`` is that too."""
-    label, colon, unit = (text, "", "") if text in table.labels else text.rpartition(":")
-    label, unit = (clean_label(label), unit.strip()) if colon else (text, "")
-    only = label.removesuffix("#1")
-    return (only if label not in table.labels and only in table.labels else label), unit
-
-
-def _two_solenoids(table: Table, text: str) -> tuple[str, str] | None:
-    """Return the two columns, each with its unit, whose difference a text such as ``uA_V - uB_V`` names; else None.
-
-    A unit behind the second one only is that of both.
-    """
-    for less in LESS.finditer(text):
-        one, other = text[: less.start()].strip(), text[less.end() :].strip()
-        (label, unit), (its_label, its_unit) = (_label_and_unit(table, each) for each in (one, other))
-        if label in table.labels and its_label in table.labels and label != its_label:
-            return (f"{label}:{its_unit}" if its_unit and not unit else one), other
-    return None
-
-
-def _refuse_two_units(table: Table, quantity: str, label: str, in_label: str) -> None:
-    """Refuse a label whose unit is another than the one that the file states beside it."""
-    beside = table.units.get(label, "")
-    known = fits(in_label, quantity) and names_a_quantity_or_current(beside)
-    if beside and known and not same_unit(in_label, beside, quantity):
-        raise InputError(
-            f"'{table.path}' column '{label}' says '{in_label}' in its label, and '{beside[:LONGEST_NAME]}' is stated "
-            "as its unit beside it; correct one, or say which it is, for example --columns "
-            f'"{quantity}={label}:{in_label}"'
-        )
-
-
-def _missing_column(quantity: str, table: Table, columns: Collection[str], clocks: ClockColumns) -> InputError:
-    """Return the error that names the columns found, and the one that may have been meant."""
-    unused = [label for label in table.labels[:MOST_MEANT] if split_column(table, label)[0] not in columns]
-    bare = {re.split(r"[_\[(]", label)[0].strip().lower(): label for label in unused}
-    spellings = [name for name, its in COLUMN_NAMES.items() if its == quantity and len(name) > 1]  # T_degC is no time
-    meant = [bare[near] for name in spellings for near in get_close_matches(name, bare, n=1)]
-    kind = QUANTITY_OF_COLUMN[quantity]
-    meant += [label for label in unused if measures(table.units.get(label, "") or split_label(label)[1], kind)]
+def _missing_column(
+    quantity: str, table: Table, chosen: Mapping[str, str], columns: Collection[str], clocks: ClockColumns,
+    *, time_is_declared: bool,
+) -> InputError:  # fmt: skip
+    """Return the error that names the columns found, and what to declare."""
     begin = f"'{table.path}' has no column of {quantity} (columns found: {table.found_labels()})"
-    if other := long_format(table.labels) or (no_flow(unused) if quantity == "Q" and not meant else ""):
+    option, proposed = "", dict[str, Column]()
+    with suppress(InputError):
+        look = _proposed(table, chosen, clocks, time_is_declared=time_is_declared)
+        option, proposed = look.option(time_is_declared=time_is_declared), look.proposed
+    unused = [label for label in table.labels[:MOST_MEANT] if split_column(table, label)[0] not in columns]
+    is_flow = quantity == "Q" and "Q" not in proposed
+    if other := long_format(table.labels) or (no_flow(unused) if is_flow else ""):
         return InputError(begin + other)
-    hint = f" (did you mean '{meant[0]}'? name it {EXAMPLE_LABELS[quantity]})" if meant else ""
     rate = ', or --sample-rate "100 Hz"' if quantity == "time" and not clocks.labels else ""
-    return MissingColumnError(
-        begin + hint,
-        f"; expected names with units such as time_s,u_V,dP_MPa,Q_Lmin, or --columns{rate}",
+    named = f"; expected names with units such as time_s,u_V,dP_MPa,Q_Lmin, or --columns{rate}"
+    return InputError(begin + (option or named))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProposedColumns:
+    """How the columns of a recording may be read.
+
+    Attributes
+    ----------
+    labels : tuple of str
+        All of the file's.
+    known : dict
+        Quantity -> column that its label, or the engineer, says to be it.
+    proposed : dict
+        Quantity -> column that is the only one it can be, by its unit.
+    unclear : dict
+        Quantity -> why it could not be told.
+    pressures : dict
+        Columns that may make the pressure drop, for a person to say which is which: label -> unit, "" if it has none.
+    command_range : str
+        Column of an unclear command with the range of its numbers, ``duty:0..0.9 = 0..100 %``, for a person to correct;
+        or of two columns that may drive a solenoid each the difference, ``uA_V - uB_V``.
+    times : tuple
+        Labels of the columns that are a time.
+    """
+
+    labels: tuple[str, ...]
+    known: dict[str, Column]
+    proposed: dict[str, Column]
+    unclear: dict[str, str]
+    pressures: dict[str, str]
+    command_range: str = ""
+    times: tuple[str, ...] = ()
+
+    @property
+    def to_paste(self) -> str:
+        """What --columns may say, of all that is known or the only one it can be; empty where that is nothing.
+
+        LABEL stands for a label that is not known.
+        """
+        known = {name: column for name, column in (self.known | self.proposed).items() if name not in self.unclear}
+        labels = {name: known[name].label for name in ("time", "u", *PORTS, "dP", "Q") if name in known}
+        if not any(name in labels for name in PRESSURES):
+            labels |= _two_ports(self.pressures)
+        if not labels:
+            return ""
+        if LESS.search(self.command_range):
+            labels |= {"u": self.command_range}
+        labels |= {name: f"LABEL:{EXAMPLE_UNITS[name]}" for name in ("u", "Q") if name not in labels}
+        return ", ".join(f"{name}={label}" for name, label in labels.items() if label)
+
+    def option(self, *, time_is_declared: bool) -> str:
+        """Return what to declare, as the rest of a sentence; nothing where the columns tell nothing."""
+        if not self.to_paste:
+            return ""
+        unknown = " (LABEL: the one that you know)" if "=LABEL:" in self.to_paste else ""
+        timeless = not time_is_declared and "time" not in self.known | self.proposed
+        clock = ', and --sample-rate "100 Hz" (the rate of your logger)' if timeless else ""
+        if timeless and self.times:
+            clock = f", and as time that of the command, for example time={self.times[0]}"
+        return f'; by their units, give --columns "{self.to_paste}"{unknown}{clock}'
+
+    @property
+    def bare_pressures(self) -> tuple[str, ...]:
+        """Labels that look like a pressure and have no unit, where no pressure drop is known."""
+        ports = {column.label for column in self.known.values()}
+        bare = (label for label, unit in self.pressures.items() if not unit and label not in ports)
+        return () if self.has_dp or "dP" in self.proposed else tuple(bare)
+
+    @property
+    def has_dp(self) -> bool:
+        """Whether columns that are known make the pressure drop."""
+        return bool(metering_edge(self.known).quantities)
+
+
+def _two_ports(labels: Iterable[str]) -> dict[str, str]:
+    """Return the working ports where the labels are alike but for an A and a B, such as ``Druck A [bar]``."""
+    both = list(labels)
+    if len(both) != 2:
+        return {}
+    return next(
+        (
+            {"pA": one, "pB": other}
+            for one, other in (both, both[::-1])
+            if one != other and re.sub(r"(?<![^\W_])A(?![^\W_])", "B", one) == other
+        ),
+        {},
     )
 
 
+def propose_columns(
+    path: Path, chosen: Mapping[str, str], skip_rows: int | None = None, *, time_is_declared: bool = False
+) -> ProposedColumns:
+    """Tell which column of a recording is which quantity.
+
+    `chosen` is what the engineer has declared, as `parse_columns` gives it.
+
+    Raises
+    ------
+    InputError
+        If the file can't be read, or its labels contradict one another.
+    """
+    with open_bytes(path, "ramp file") as file:
+        table = read_table(file, path, skip_rows)
+        return _proposed(table, chosen, ClockColumns(table), time_is_declared=time_is_declared)
+
+
+def _proposed(
+    table: Table, chosen: Mapping[str, str], clocks: ClockColumns, *, time_is_declared: bool
+) -> ProposedColumns:
+    known, times = labelled_columns(table, chosen, clocks), clocks.labels
+    edge = metering_edge(known)
+    known = {name: column for name, column in known.items() if not _is_unused(name, column, edge)}
+    unclear = {name: why for name, column in known.items() if (why := _why_unreadable(table.path, name, column))}
+    taken = {column.label for column in known.values()}
+    proposed: dict[str, Column] = {}
+    for quantity in ("u", "Q", "dP") if time_is_declared else ("time", "u", "Q", "dP"):
+        if quantity in known or (quantity == "dP" and edge.quantities):
+            continue
+        candidates = [label for label in _candidates(table, quantity) if label not in taken]
+        named = [label for label in candidates if nearest(re.split(r"[_\[( ]", label)[0], _spellings(quantity))]
+        port = next((known[name].label for name in PORTS if name in known and quantity == "dP"), None)
+        if quantity == "dP" and edge.ambiguous:
+            unclear["dP"] = which_edge({name: column.label for name, column in known.items()})
+        elif port is not None:
+            unclear["dP"] = f"'{port}' is the pressure of one port; which column is that of the other, or the drop?"
+        elif len(candidates) == 1 or (len(named) == 1 and quantity != "dP"):
+            label = candidates[0] if len(candidates) == 1 else named[0]
+            dated = table.dated(label) if quantity == "time" else label
+            proposed[quantity] = Column(label=dated, unit=_unit_of(table, label))
+            taken.add(label)
+        elif why := _why_none(table, quantity, candidates):
+            unclear[quantity] = why
+    u = (known | proposed).get("u")
+    if "time" in unclear and u is not None and (clock := clocks.of("u", u.label)):
+        proposed["time"] = clocks.column(clock)
+        del unclear["time"]
+    elif "time" in unclear and u is None and len(times) > 1:
+        unclear["time"] += "; that of the command is taken as soon as u is known"
+    command_range = _command_range(table, known, taken) if "u" in unclear else ""
+    command_range = (_two_solenoids(table, known, taken) if "u" in unclear else "") or command_range
+    drop = {column.label for name, column in proposed.items() if name == "dP"}
+    pressures = {} if edge.quantities else _pressures(table, known, taken - drop)
+    if command_range:
+        why = "if each drives a solenoid, their difference is the signed command:"
+        why = why if LESS.search(command_range) else "or say what its numbers mean, for example"
+        unclear["u"] += f"; {why} --columns \"u={command_range}\""
+    return ProposedColumns(
+        labels=table.labels, known=known, proposed=proposed, unclear=unclear, pressures=pressures,
+        command_range=command_range, times=tuple(times),
+    )  # fmt: skip
+
+
+def _pressures(table: Table, known: Mapping[str, Column], taken: set[str]) -> dict[str, str]:
+    """Return the columns that may be a pressure: of ports, in a unit of pressure, or named like one."""
+    found = {column.label: column.unit for name, column in known.items() if name in PORTS}
+    for label in table.labels:
+        if label in taken:
+            continue
+        if fits(_unit_of(table, label), "dP"):
+            found.setdefault(label, _unit_of(table, label))
+        elif not table.units.get(label) and PRESSURE_LIKE.fullmatch(label):
+            found.setdefault(label, "")
+    return found
+
+
+def _command_range(table: Table, known: Mapping[str, Column], taken: set[str]) -> str:
+    """Return the range form of a command without a unit, or of the only column that is named like a duty cycle."""
+    labels = [known["u"].label] if "u" in known and not known["u"].unit else []
+    labels = labels or [label for label in table.labels if label not in taken and DUTY_LIKE.search(label)]
+    return _range_of(table, labels[0]) if len(labels) == 1 and labels[0] else ""
+
+
+def _two_solenoids(table: Table, known: Mapping[str, Column], taken: set[str]) -> str:
+    """Return the difference of the only two columns that may be commands of which never both are driven; or nothing."""
+    taken = taken - {each.label for name, each in known.items() if name == "u"}
+    labels = [label for label in table.labels if label not in taken and not LESS.search(label)]
+    named = [each for each in labels if DUTY_LIKE.search(each) or split_label(each)[0] == "u"]
+    driven = {}
+    for label in [each for each in labels if fits(_unit_of(table, each), "u") or each in named][:MOST_COMMANDS]:
+        with suppress(InputError):
+            numbers = table.numbers(label)
+            least = DRIVEN * np.fmax.reduce(numbers, initial=0.0)
+            on = numbers > least
+            if np.fmin.reduce(numbers, initial=0.0) >= -least and on.any():  # noise at rest is on both sides of zero
+                driven[label] = on
+    pairs = [
+        (one, other)
+        for one, other in combinations(driven, 2)
+        if driven[one].size == driven[other].size
+        and np.count_nonzero(driven[one] & driven[other]) <= BOTH * min(map(np.count_nonzero, driven.values()))
+        and same_unit(_unit_of(table, one), _unit_of(table, other), "u") == fits(_unit_of(table, one), "u")
+    ]
+    if len(pairs) != 1:
+        return ""
+    one, other = pairs[0]
+    if fits(_unit_of(table, one), "u"):
+        return f"{one} - {other}"
+    ranges = [_range_of(table, label).removeprefix(f"{label}:") for label in pairs[0]]
+    return f"{one} - {other}:{max(ranges, key=lambda text: float(text.partition(' ')[0].rpartition('..')[2]))}"
+
+
+def _range_of(table: Table, label: str) -> str:
+    """Return the range form of a column without a unit; nothing where its numbers are no command's."""
+    try:
+        numbers = table.numbers(label)
+    except InputError:
+        return ""
+    lowest, highest = np.fmin.reduce(numbers, initial=0.0), np.fmax.reduce(numbers, initial=0.0)
+    if not 0 < highest < LARGEST_COMMAND:
+        return ""
+    top = f"{highest:.3g}" if highest < 1000 else f"{highest:.0f}"
+    both = bool(lowest < -0.5 * highest)
+    return f"{label}:{f'-{top}' if both else '0'}..{top} = {'-100' if both else '0'}..100 %"
+
+
+def _is_unused(quantity: str, column: Column, edge: MeteringEdge) -> bool:
+    """Tell whether a pressure is none that the reader takes: one beside the edge's, or a supply's without a unit."""
+    beside = bool(edge.quantities) and quantity not in edge.quantities
+    return quantity in PRESSURES and (beside or (not edge.ambiguous and quantity in ("pP", "pT") and not column.unit))
+
+
+def _why_unreadable(path: Path, quantity: str, column: Column) -> str:
+    """Return why the reader would refuse a column, or nothing."""
+    if not column.unit:
+        return f"'{column.label}' has no unit; give it after a colon, such as {EXAMPLE_UNITS[quantity]}"
+    try:
+        scaling_of(path, quantity, column, u_max=1.0)
+    except InputError as error:
+        return str(error)
+    return ""
+
+
+def _candidates(table: Table, quantity: str) -> list[str]:
+    """Return the columns in a unit of a quantity; for the time also those of dates or times of day."""
+    candidates = [label for label in table.labels if fits(_unit_of(table, label), quantity)]
+    if quantity == "time":
+        clocks = [label for label in table.labels if _is_clock(table, label)]
+        # Milliseconds beside a clock are its fractions.
+        candidates = [label for label in candidates if not (clocks and is_milliseconds(label))] or clocks
+    return candidates
+
+
+def _is_clock(table: Table, label: str) -> bool:
+    try:
+        return table.is_clock(label)
+    except InputError:  # a date without a time of day
+        return False
+
+
+def _unit_of(table: Table, label: str) -> str:
+    return table.units.get(label) or split_column(table, label)[1]
+
+
+def _spellings(quantity: str) -> list[str]:
+    return [name for name, its in COLUMN_NAMES.items() if its == quantity and len(name) > 1]
+
+
+def _why_none(table: Table, quantity: str, candidates: list[str]) -> str:
+    """Return why no column is proposed, with what to do; nothing for a pressure drop that nothing hints at."""
+    both = " and ".join(map(repr, candidates))
+    if candidates and quantity != "dP":
+        return f"{both} could each be it, by their units"
+    if candidates:
+        option = f'--columns "pA={candidates[0]}, pB={candidates[-1]}"'
+        ports = f" If one is ahead of the metering edge and one behind it: {option}"
+        return f"{both}: a pressure, but is it the drop, pA or pB?{ports if len(candidates) == 2 else ''}"
+    currents = [label for label in table.labels if measures(_unit_of(table, label), "current")]
+    if quantity == "dP":
+        currents = [label for label in currents if PRESSURE_LIKE.fullmatch(re.split(r"[\[(/]", label)[0].strip())]
+        declared = currents and range_example("dP", currents[0], _unit_of(table, currents[0]))
+        return f"'{currents[0]}' is a current; say what it means, {declared}" if currents else ""
+    why = f"no column has a unit of {QUANTITY_OF_COLUMN[quantity]}"
+    if currents and quantity != "time":
+        declared = range_example(quantity, currents[0], _unit_of(table, currents[0]))
+        why += f"; if {' or '.join(map(repr, currents))} is it, say what the current means, {declared}"
+    why += long_format(table.labels) or (no_flow(table.labels) if quantity == "Q" else "")
+    return f'{why}{_or_first_column(table)}; if there is none, --sample-rate "100 Hz"' if quantity == "time" else why
+
+
+def _or_first_column(table: Table) -> str:
+    """Return how the first column is declared as time, where it rises and has no unit, as LabVIEW's X_Value.
+
+    One that counts the rows is no time: a unit would make a wrong one of it.
+    """
+    first = table.labels[0]
+    if not first or table.units.get(first) or names_a_quantity(split_column(table, first)[1]):
+        return ""
+    try:
+        steps = np.diff(table.numbers(first))
+    except InputError:
+        return ""
+    if not (steps.size and np.all(steps >= 0) and steps.max() > 0):
+        return ""
+    if np.all(steps == 1):
+        return f"; '{first}' counts the rows: export the time beside it"
+    return f"; if '{first}' is it, say its unit, for example --columns \"time={first}:s\""

@@ -8,7 +8,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 
@@ -17,16 +17,19 @@ from dzdesign.identify.reading.table import QUOTED_CHARACTERS, clean_label
 from dzdesign.identify.reading.text_table import TextTable
 from dzdesign.identify.reading.time_stamps import start_of
 
+if TYPE_CHECKING:
+    import polars as pl
+
 #: The column that LabVIEW announces, and leaves out of rows that have no comment.
 COMMENT = "comment"
-LABVIEW, END_OF_HEADER, X_VALUE = b"LabVIEW Measurement", "***End_of_Header***", "X_Value"
+LABVIEW, END_OF_HEADER, X_VALUE = "LabVIEW Measurement", "***End_of_Header***", "X_Value"
 #: First cells of a line that stands above a segment's header.
 WORD = re.compile(r"[^\W\d]|\*\*\*")
-#: A block of TwinCAT Scope: names of the channels, from the blank line above them, and the first line of samples.
-SCOPE = re.compile(rb"(?<=\n)Name([\t;,])(?:[^\n]*\n){1,40}?SampleTime\[ms\][^\n]*\n")
+#: A block of TwinCAT Scope: it begins with the channels' names, ends with their steps, and samples follow the words.
+SCOPE_NAMES, SCOPE_STEP, SCOPE_WORD = re.compile(r"Name[\t;,]"), "SampleTime[ms]", re.compile(r"[^\W\d]|\s|$")
 SCOPE_NAME, SCOPE_TIME = "Name", "Time (ms)"
-#: Where it is looked for.
-SCOPE_HEAD = 1 << 16
+#: Lines in which it is looked for, and lines that it has at most.
+SCOPE_LINES, SCOPE_BLOCK = 1000, 42
 
 
 @final
@@ -56,37 +59,42 @@ class Segment:
             return np.nan
 
 
-def without_blocks(text: bytes, path: Path) -> tuple[bytes, tuple[Segment, ...], bool]:
-    """Return a text whose blocks are comments, the segments of a LabVIEW file, and whether there were any blocks.
+def without_blocks(lines: "pl.Series", start: int, path: Path) -> "tuple[pl.Series, tuple[Segment, ...], bool]":
+    """Return lines whose blocks are comments, the segments of a LabVIEW file, and whether there were any blocks.
+
+    The file begins with the line `start`.
 
     Raises
     ------
     InputError
         If the segments of a LabVIEW file have other columns.
     """
-    if text.startswith(LABVIEW):
-        plain, segments = _of_labview(text.decode(), path)
-        return plain.encode(), tuple(segments), bool(segments)
-    block = SCOPE.search(text[:SCOPE_HEAD])
-    if block is None:
-        return text, (), False
-    end = re.compile(rb"^(?![^\W\d]|\s)", re.MULTILINE).search(text, block.end())
-    head = text[: end.start() if end else len(text)].split(b"\n")
-    names = text.count(b"\n", 0, block.start())
-    labels = [cell.strip() for cell in head[names].decode().split(block[1].decode())]
+    first = lines.slice(start, SCOPE_LINES).to_list()
+    if first and first[0].startswith(LABVIEW):
+        plain, segments = _of_labview(lines.to_list(), start, path)
+        return plain, tuple(segments), bool(segments)
+    names = next((place for place, line in enumerate(first) if place and SCOPE_NAMES.match(line)), 0)
+    block = range(names + 1, min(names + SCOPE_BLOCK, len(first))) if names else ()
+    times = next((place for place in block if first[place].startswith(SCOPE_STEP)), 0)
+    if not times:
+        return lines, (), False
+    end = next((place for place in range(times + 1, len(first)) if not SCOPE_WORD.match(first[place])), len(first))
+    separator = first[names][len(SCOPE_NAME)]
+    labels = [cell.strip() for cell in first[names].split(separator)]
     pairs = [SCOPE_TIME if index % 2 == 0 and cell == SCOPE_NAME else cell for index, cell in enumerate(labels)]
-    commented = [b"# " + line if line.strip() else line for line in head]
-    commented[names] = block[1].decode().join(pairs).encode()
-    return b"\n".join(commented[:-1]) + b"\n" + text[len(b"\n".join(head[:-1])) + 1 :], (), True
+    commented = [f"# {line}" if line.strip() else line for line in first[:end]]
+    commented[names] = separator.join(pairs)
+    return lines.scatter(range(start, start + end), commented), (), True
 
 
-def _of_labview(text: str, path: Path) -> tuple[str, list[Segment]]:
-    lines = text.split("\n")
-    separator = "," if re.search(r"^Separator[\t,]Comma", text, re.MULTILINE) else "\t"
+def _of_labview(lines: list[str], start: int, path: Path) -> "tuple[pl.Series, list[Segment]]":
+    import polars as pl
+
+    separator = "," if any(line.startswith("Separator,Comma") for line in lines[:SCOPE_LINES]) else "\t"
     segments: list[Segment] = []
     header: dict[str, list[str]] = {}
     samples, ended, labels = False, False, [""]
-    for index, line in enumerate(lines):
+    for index, line in enumerate(lines[start:], start=start):
         cells = line.split(separator)
         word = clean_label(cells[0])
         if samples and not WORD.match(word):
@@ -113,14 +121,16 @@ def _of_labview(text: str, path: Path) -> tuple[str, list[Segment]]:
             header.setdefault(word, cells)
         if line.strip():
             lines[index] = f"# {line}"
-    return "\n".join(lines), segments
+    return pl.Series(lines, dtype=pl.String), segments
 
 
 def with_stated_times(table: TextTable, segments: tuple[Segment, ...]) -> TextTable:
     """Return the table of a LabVIEW file with the units and the times that its headers state."""
+    import polars as pl
+
     if not segments:
         return table
-    units, starts, computed = dict(table.units), {}, {}
+    units, starts, cells = dict(table.units), {}, table.cells
     clocks: dict[str, str] = {}
     waveforms: dict[tuple[str, str], str] = {}
     labels, first, clock = list(table.labels), segments[0], ""
@@ -139,13 +149,12 @@ def with_stated_times(table: TextTable, segments: tuple[Segment, ...]) -> TextTa
             continue
         units[own], starts[own] = "s", first.start(column)
         times = _times(table, clock if own == clock else "", segments, column)
-        if times is not None:
-            computed[own] = times
-        labels += [] if own in labels else [own]
-    return replace(
-        table, labels=tuple(labels), units=units, clocks=clocks, starts=starts, computed=computed,
-        width=len(table.labels),
-    )  # fmt: skip
+        if own not in labels:
+            labels.append(own)
+        if times is not None:  # a new column, or in place of that which the file left blank
+            name = f"field_{labels.index(own)}"
+            cells = cells.with_columns(pl.Series(name, times))
+    return replace(table, labels=tuple(labels), units=units, clocks=clocks, starts=starts, cells=cells)
 
 
 def _times(table: TextTable, label: str, segments: tuple[Segment, ...], column: int) -> np.ndarray | None:

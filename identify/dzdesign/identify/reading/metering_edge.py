@@ -52,10 +52,6 @@ class MeteringEdge:
     negative: tuple[DropQuantity, ...] | None = None
     ambiguous: bool = False
 
-    def at(self, sign: int) -> tuple[DropQuantity, ...] | None:
-        """Return the quantities for a sign of the command."""
-        return self.positive if sign > 0 else self.negative
-
     @property
     def quantities(self) -> tuple[str, ...]:
         """The quantities that are read; none where there is no pressure drop."""

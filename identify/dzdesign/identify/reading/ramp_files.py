@@ -10,17 +10,16 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import BinaryIO
+from typing import final
 
 import numpy as np
 
 from dzdesign.core.documents import open_bytes, sha256_of_file
 from dzdesign.core.errors import InputError
-from dzdesign.core.recorded_units import Quantity, Unit
-from dzdesign.identify.reading.binary_table import LONGEST_MARK, format_of, read_binary_table
+from dzdesign.identify.reading.binary_table import read_table
 from dzdesign.identify.reading.channel_clocks import lay_on_one_clock, refuse_an_early_end
-from dzdesign.identify.reading.clock import ASSUMED_MS, clock_doubt, may_count_ms, never_back, read_times_of_day
-from dzdesign.identify.reading.column_labels import PRESSURES, QUANTITY_OF_COLUMN, Column
+from dzdesign.identify.reading.clock import ASSUMED_MS, Clock, doubt_of_clock, never_back, read_clock
+from dzdesign.identify.reading.column_labels import PRESSURES, Column
 from dzdesign.identify.reading.columns import find_columns
 from dzdesign.identify.reading.metering_edge import metering_edge, side_without_dp
 from dzdesign.identify.reading.missing_values import (
@@ -30,12 +29,8 @@ from dzdesign.identify.reading.missing_values import (
     without_placeholders,
 )
 from dzdesign.identify.reading.ramp_test import RampTest, Switch, thin
-from dzdesign.identify.reading.scaling import Scaling, scaling_of
-from dzdesign.identify.reading.table import AND, QUOTED_CHARACTERS, Table
-from dzdesign.identify.reading.text_file import read_text_table
-from dzdesign.identify.reading.time_stamps import Start
-from dzdesign.identify.reading.units_of_columns import units_of_columns
-from dzdesign.identify.valve.recorded_drop import DropColumns
+from dzdesign.identify.reading.scaling import Scaling, in_SI, scaling_of, units_of_columns
+from dzdesign.identify.reading.table import AND, Table
 
 #: Fewest complete rows in which two branches with a threshold could stand.
 MIN_ROWS = 20
@@ -43,10 +38,6 @@ MIN_ROWS = 20
 SIMULATED_MARK = "SIMULATED"
 #: A column of two values is looked for among so many, in so many rows, and changes so often at most.
 MOST_SWITCHES, LONGEST_SWITCH, MOST_CHANGES = 8, 1_000_000, 200
-#: Stands for the column of time where the sample rate is declared.
-DECLARED_CLOCK = Column(label="--sample-rate", unit="s")
-#: SI numbers beyond these are not a measurement of a valve: a wrong unit, or what a logger writes for an overflow.
-LARGEST = {"time": 1e12, "voltage": 1e4, "pressure": 1e9, "flow": 10.0}
 
 
 def read_ramp_file(
@@ -88,77 +79,8 @@ def read_ramp_file(
     path = Path(path)
     with open_bytes(path, "ramp file") as file:
         sha256 = sha256_of_file(file)
-        recording = _read_recording(
-            read_table(file, path, skip_rows, missing), columns or {}, u_max, dp, sample_rate, _numbers_among(missing)
-        )
-    _refuse_too_few_rows(path, recording)
-    thinned = thin(recording.rows)
-    time, u, q, *measured = (np.array(column) for column in thinned.rows)
-    doubt = _doubt_of_clock(path, recording, time, u)
-    return RampTest(
-        source=path.name.encode(errors="replace").decode(),
-        sha256=sha256,
-        time=time / 1e3 if doubt == ASSUMED_MS else time,
-        u=u,
-        q=q,
-        dp=measured[0] if measured else None,
-        dp_from=recording.dp_from,
-        side_without_dp=recording.side_without_dp,
-        dp_is_declared=dp is not None,
-        rows_read=recording.rows.shape[1],
-        run=thinned.run,
-        clock_doubt=doubt,
-        simulated=recording.simulated,
-        missing=recording.missing,
-        stamp=recording.stamp,
-        started=recording.stamp.seconds if recording.stamp else None,
-        q_range=recording.q_range,
-        unseen=recording.unseen,
-        units=recording.units,
-        switches=tuple(
-            replace(each, changes=each.changes / (1e3 if doubt == ASSUMED_MS else 1.0)) for each in recording.switches
-        ),
-        columns=recording.columns,
-    )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Recording:
-    """The complete rows of a file: time, command, flow and, if it is known, pressure drop (3 or 4, N).
-
-    `clock` is the column of time, which may count milliseconds if `may_count_ms` says so; the rest is of `RampTest`.
-    """
-
-    rows: np.ndarray
-    clock: Column
-    simulated: bool
-    may_count_ms: bool
-    missing: Mapping[str, str]
-    stamp: Start | None
-    dp_from: tuple[tuple[DropColumns, ...], tuple[DropColumns, ...]]
-    side_without_dp: str
-    units: Mapping[Quantity, tuple[Unit, ...]]
-    q_range: tuple[float, float] | None
-    unseen: tuple[float, float]
-    switches: tuple[Switch, ...]
-    columns: Mapping[str, Column]
-
-
-def _doubt_of_clock(path: Path, recording: _Recording, time: np.ndarray, u: np.ndarray) -> str:
-    """Return what is doubtful about the unit of the time, as `clock_doubt` does; refuse one that nobody knows."""
-    clock = recording.clock
-    doubt = clock_doubt(time, u, unit_stated=bool(clock.unit)) if recording.may_count_ms else ""
-    if not clock.unit and doubt != ASSUMED_MS:
-        scaling_of(path, "time", clock, u_max=1.0)  # says that it lacks one
-    return doubt
-
-
-def _refuse_too_few_rows(path: Path, recording: _Recording) -> None:
-    rows = recording.rows.shape[1]
-    if rows < MIN_ROWS:
-        found = ", ".join(recording.missing.values())
-        missing = f"; {found} are missing samples" if found else ""
-        raise InputError(f"'{path}' has {rows} complete rows, expected at least {MIN_ROWS} of a ramp test{missing}")
+        table = read_table(file, path, skip_rows, missing)
+        return _ramp_test(table, sha256, columns or {}, u_max, dp, sample_rate, _numbers_among(missing))
 
 
 def _is_marked(comments: str) -> bool:
@@ -175,62 +97,71 @@ def _numbers_among(missing: Collection[str]) -> list[float]:
     return numbers
 
 
-def read_table(
-    file: BinaryIO, path: Path, skip_rows: int | None = None, missing: Collection[str] = ()
-) -> Table:
-    """Read a table of any known format; its first bytes tell which, not its name.
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Channels:
+    """The columns of a recording as they were found and read.
 
-    Raises
-    ------
-    InputError
-        If it is none of these, or not a whole one.
+    Attributes
+    ----------
+    data : dict
+        Quantity -> samples in SI, NaN where one is missing.
+    scalings : dict
+        Quantity -> what turned them into SI, the time apart.
+    missing : dict
+        Label -> what stood there for no value.
+    clock : Clock or None
+        The time; None where the sample rate is declared.
     """
-    start = file.read(LONGEST_MARK)
-    file.seek(0)
-    kind = format_of(start, path)
-    return read_binary_table(file, path, kind) if kind else read_text_table(file, path, skip_rows, missing)
+
+    data: dict[str, np.ndarray]
+    scalings: dict[str, Scaling]
+    missing: dict[str, Missing]
+    clock: Clock | None
 
 
-def _read_recording(
+def _read_channels(table: Table, found: Mapping[str, Column], u_max: float, no_numbers: Sequence[float]) -> _Channels:
+    data: dict[str, np.ndarray] = {}
+    scalings: dict[str, Scaling] = {}
+    missing: dict[str, Missing] = {}
+    clock = None
+    for quantity, column in found.items():
+        if quantity == "time":
+            clock = read_clock(table, column, u_max, no_numbers)
+            data[quantity], missing[column.label] = clock.seconds, clock.missing
+            continue
+        for each in column.every:
+            numbers, placeholders = without_placeholders(table.numbers(each.label), rises=False, declared=no_numbers)
+            scaling = scaling_of(table.path, quantity, each, u_max)
+            numbers, failed = without_failed_signals(numbers, scaling.no_signal_below)
+            missing[each.label] = table.marked.get(each.label, Missing()) + placeholders + failed
+            numbers = in_SI(table, quantity, each, numbers, scaling)
+            data[quantity] = numbers if each is column else data[quantity] - numbers
+            scalings.setdefault(quantity, scaling)
+    return _Channels(data=data, scalings=scalings, missing=missing, clock=clock)
+
+
+def _ramp_test(
     table: Table,
+    sha256: str,
     chosen: Mapping[str, str],
     u_max: float,
     dp: float | None,
     sample_rate: float | None,
     no_numbers: Sequence[float],
-) -> _Recording:
-    """Return the rows of a file that lack nothing."""
+) -> RampTest:
+    """Return the rows of a file that lack nothing; of a long one thinned."""
     found = find_columns(table, chosen, sample_rate)
     _refuse_two_pressures(table, found, dp)
     _refuse_unequal_lengths(table, found)
     table.load([each.label for column in found.values() for each in column.every])
-    data: dict[str, np.ndarray] = {}
-    missing: dict[str, Missing] = {}
-    q_range = None
-    is_clock = sample_rate is None and table.is_clock(found["time"].label)
-    stamp = table.started(found["time"].label) if sample_rate is None and not is_clock else None
-    for quantity, column in found.items():
-        if quantity == "time" and is_clock:
-            data[quantity], stamp = read_times_of_day(table, column.label)
-            missing[column.label] = table.marked.get(column.label, Missing())
-            continue
-        for each in column.every:
-            numbers, found_numbers = without_placeholders(
-                table.numbers(each.label), rises=quantity == "time", declared=no_numbers
-            )
-            missing[each.label] = table.marked.get(each.label, Missing()) + found_numbers
-            unclear = quantity == "time" and not each.unit and may_count_ms(numbers)
-            if not unclear:  # else the whole recording tells later what they count
-                scaling = scaling_of(table.path, quantity, each, u_max)
-                numbers, failed = without_failed_signals(numbers, scaling.no_signal_below)
-                missing[each.label] += failed
-                numbers = _in_SI(table, quantity, each, numbers, scaling)
-                q_range = scaling.ends if quantity == "Q" else q_range
-            data[quantity] = numbers if each is column else data[quantity] - numbers
+    channels = _read_channels(table, found, u_max, no_numbers)
+    data, clock, scalings = channels.data, channels.clock, channels.scalings
     refuse_an_early_end(table, found, data)
-    lay_on_one_clock(table, found, data, u_max, time_is_chosen="time" in chosen)
-    if sample_rate is not None:
-        data["time"] = np.arange(data["u"].size) / sample_rate
+    if clock:
+        lay_on_one_clock(table, found, data, clock, u_max, time_is_chosen="time" in chosen)
+    else:
+        data["time"] = np.arange(data["u"].size) / (sample_rate or np.nan)
     edge, labels = metering_edge(found), {quantity: column.label for quantity, column in found.items()}
     measured = edge.drop(data, data["u"], u_max)
     if measured is None and dp is not None:
@@ -242,21 +173,45 @@ def _read_recording(
         row[:] = samples[complete]
     rows[0] = never_back(table, rows[0], complete)
     without_flow = data["u"][np.isfinite(data["u"]) & ~np.isfinite(data["Q"])]
-    return _Recording(
-        rows=rows,
-        clock=found.get("time", DECLARED_CLOCK),
-        simulated=_is_marked(table.comments),
-        may_count_ms=sample_rate is None and not is_clock and may_count_ms(rows[0], longest_step=np.inf),
-        missing=describe_missing(missing),
-        stamp=stamp,
+    side_without = side_without_dp(edge, labels, table.path, data["u"], u_max)
+    units = units_of_columns(table.path, found, scalings["u"], u_max)
+    switches = list(_switches(table, found, rows[0], complete))
+    missing = describe_missing(channels.missing)
+    _refuse_too_few_rows(table.path, rows.shape[1], missing)
+    thinned = thin(rows)
+    time, u, q, *drop = (np.array(column) for column in thinned.rows)
+    doubt = doubt_of_clock(table.path, clock, rows[0], time, u) if clock else ""
+    in_ms = 1e3 if doubt == ASSUMED_MS else 1.0
+    return RampTest(
+        source=table.path.name.encode(errors="replace").decode(),
+        sha256=sha256,
+        time=time / in_ms,
+        u=u,
+        q=q,
+        dp=drop[0] if drop else None,
         dp_from=edge.columns(labels),
-        side_without_dp=side_without_dp(edge, labels, table.path, data["u"], u_max),
-        units=units_of_columns(table.path, found, u_max),
-        q_range=q_range,
+        side_without_dp=side_without,
+        dp_is_declared=dp is not None,
+        rows_read=rows.shape[1],
+        run=thinned.run,
+        clock_doubt=doubt,
+        simulated=_is_marked(table.comments),
+        missing=missing,
+        stamp=clock.stamp if clock else None,
+        started=clock.stamp.seconds if clock and clock.stamp else None,
+        q_range=scalings["Q"].ends,
         unseen=(float(without_flow.min(initial=0.0)), float(without_flow.max(initial=0.0))),
-        switches=tuple(_switches(table, found, rows[0], complete)),
+        units=units,
+        switches=tuple(replace(each, changes=each.changes / in_ms) for each in switches),
         columns={quantity: found[quantity] for quantity in ("u", "Q")},
     )
+
+
+def _refuse_too_few_rows(path: Path, rows: int, missing: Mapping[str, str]) -> None:
+    if rows < MIN_ROWS:
+        found = ", ".join(missing.values())
+        samples = f"; {found} are missing samples" if found else ""
+        raise InputError(f"'{path}' has {rows} complete rows, expected at least {MIN_ROWS} of a ramp test{samples}")
 
 
 def _switches(table: Table, found: Mapping[str, Column], time: np.ndarray, complete: np.ndarray) -> Iterator[Switch]:
@@ -296,22 +251,6 @@ def _refuse_unequal_lengths(table: Table, found: Mapping[str, Column]) -> None:
                 f"'{table.path}' column '{column.label}' has {table.length(column.label)} samples, but "
                 f"'{first}' has {expected}; expected one clock; export it with a time of its own"
             )
-
-
-def _in_SI(table: Table, quantity: str, column: Column, numbers: np.ndarray, scaling: Scaling) -> np.ndarray:
-    """Return one column in SI, NaN where a sample is missing; refuse what no valve gives."""
-    with np.errstate(over="ignore", invalid="ignore"):  # an infinity is refused below
-        numbers = numbers * scaling.gain
-        numbers += scaling.offset
-    largest = LARGEST[QUANTITY_OF_COLUMN[quantity]]
-    if np.fmax.reduce(numbers, initial=0.0) > largest or np.fmin.reduce(numbers, initial=0.0) < -largest:
-        row = int(np.flatnonzero(np.abs(numbers) > largest)[0])
-        raise InputError(
-            f"'{table.path}' {table.place(row)}, column '{column.label}': "
-            f"'{table.cell(column.label, row)[:QUOTED_CHARACTERS]}' is no measurement of a valve in that unit; "
-            "correct it, or leave the cell blank if the sample is missing"
-        )
-    return numbers
 
 
 def ramp_file_bytes(columns: Mapping[str, np.ndarray], comments: tuple[str, ...], *, compress: bool) -> bytes:

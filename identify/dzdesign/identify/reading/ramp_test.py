@@ -1,9 +1,9 @@
 """`RampTest`: one recorded ramp test, as all rooms of identify take it; of a long recording thinned."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import final
+from functools import cached_property, wraps
+from typing import Concatenate, ParamSpec, TypeVar, final
 
 import numpy as np
 
@@ -13,6 +13,8 @@ from dzdesign.identify.reading.time_stamps import Start
 from dzdesign.identify.valve.left_out import LeftOut
 from dzdesign.identify.valve.recorded_drop import DropColumns, DropSign
 
+Given = ParamSpec("Given")
+Found = TypeVar("Found")
 #: Rows of one recording that are kept at most: more are thinned.
 MOST_ROWS = 400_000
 #: Runs whose medians are taken at a time: what that takes of memory has a bound.
@@ -104,11 +106,12 @@ class RampTest:
     unseen: tuple[float, float] = (0.0, 0.0)
     #: Rows whose flow lies beyond what the meter can show, (N,) bool; None: none does.
     beyond: np.ndarray | None = None
+    #: Flow below which nothing was written, which is given as zero here, m³/s; 0: there is none.
+    clipped_below: float = 0.0
     #: Columns of the command and the flow as they were found, by quantity.
     columns: Mapping[str, Column] = field(default_factory=dict)
     #: Units of the file's columns, each once; `u`, `dp` and `q` are in SI.
     units: Mapping[Quantity, tuple[Unit, ...]] = field(default_factory=dict)
-
     #: Columns beside those that were read, of two values each.
     switches: tuple[Switch, ...] = ()
 
@@ -142,10 +145,28 @@ class RampTest:
         return {switch.label: switch.at(at_top) for switch in self.switches}
 
     def part(self, rows: slice | np.ndarray) -> "RampTest":
-        """Return the recording with some of its rows."""
+        """Return the recording with some of its rows; of all of them itself, whose command is smoothed once."""
+        if isinstance(rows, np.ndarray) and rows.dtype == bool and rows.all():
+            return self
         dp = None if self.dp is None else self.dp[rows]
         beyond = None if self.beyond is None else self.beyond[rows]
         return replace(self, time=self.time[rows], u=self.u[rows], q=self.q[rows], dp=dp, beyond=beyond)
+
+
+def once_a_recording(
+    function: "Callable[Concatenate[RampTest, Given], Found]",
+) -> "Callable[Concatenate[RampTest, Given], Found]":
+    """Return a function that is computed once for a recording and what else is given; nobody writes into its result."""
+
+    @wraps(function)
+    def found(test: RampTest, /, *given: Given.args, **named: Given.kwargs) -> Found:
+        known: dict[object, Found] = test.__dict__.setdefault("_found", {})
+        key = function.__name__, *given, *named.items()
+        if key not in known:
+            known[key] = function(test, *given, **named)
+        return known[key]
+
+    return found
 
 
 @final

@@ -1,24 +1,44 @@
-"""From the numbers of a column to SI: by its unit, or by the range of a transmitter, ``4..20 mA = 0..50 L/min``."""
+"""From the numbers of a column to SI: by its unit, or by the range of a transmitter, ``4..20 mA = 0..50 L/min``.
+
+And the units in which a recording's columns stand, for whoever reads what was found: see `RecordedUnits`.
+"""
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import final
 
+import numpy as np
+
 from dzdesign.core.errors import InputError
+from dzdesign.core.recorded_units import (
+    CommandUnit,
+    FlowUnit,
+    PressureUnit,
+    Quantity,
+    RecordedUnits,
+    Unit,
+    common_units,
+    name_of_unit,
+    significant,
+)
 from dzdesign.core.units import SI_UNIT, SignalRange, measures, read_signal_range, si_factor
+from dzdesign.identify.constants import L_MIN, MPA
 from dzdesign.identify.reading.column_labels import (
     EXAMPLE_LABELS,
     LONGEST_NAME,
     PER_CENT,
+    PRESSURES,
     QUANTITY_OF_COLUMN,
     Column,
     same_unit,
 )
 from dzdesign.identify.reading.missing_values import NO_CURRENT
+from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.reading.table import QUOTED_CHARACTERS, Table
 
 #: What a transmitter gives, or an amplifier takes; a range may be of any other unit, or of bare numbers.
 TRANSMITTED = ("current", "voltage")
@@ -29,6 +49,12 @@ MISTYPED = {"ma": "mA", "a": "A", "v": "V", "mv": "mV"}
 LIVE_ZERO = 0.004
 #: Full scale in the examples of messages.
 FULL_SCALE: Mapping[str, str] = {"u": "0..10 V", "Q": "0..50 L/min"}
+#: SI numbers beyond these are not a measurement of a valve: a wrong unit, or what a logger writes for an overflow.
+LARGEST = {"time": 1e12, "voltage": 1e4, "pressure": 1e9, "flow": 10.0}
+#: How many of a unit are 1 V, MPa or L/min, where numbers in it can be read: 1 MPa is 1e7 Ba.
+SMALLEST_FACTOR, LARGEST_FACTOR = 1e-9, 1e9
+#: What stands in front of one.
+NOT_OF_A_UNIT = " +-0123456789.,"
 
 
 @final
@@ -56,13 +82,34 @@ def scaling_of(path: Path, quantity: str, column: Column, u_max: float) -> Scali
         If the unit is none of the quantity's.
     """
     if not column.unit:
-        raise InputError(f"'{path}' column '{column.label}' has no unit; write for example {EXAMPLE_LABELS[quantity]}")
+        raise no_unit(path, quantity, column.label)
     try:
         if "=" in column.unit or ".." in column.unit:
             return _of_range(quantity, column, u_max)
         return Scaling(gain=_factor(quantity, column.unit, u_max))
     except InputError as error:
         raise InputError(f"'{path}' column '{column.label}': {error}{_hint(quantity, column)}") from error
+
+
+def no_unit(path: Path, quantity: str, label: str) -> InputError:
+    """Return the error for a column whose unit nobody knows."""
+    return InputError(f"'{path}' column '{label}' has no unit; write for example {EXAMPLE_LABELS[quantity]}")
+
+
+def in_SI(table: Table, quantity: str, column: Column, numbers: np.ndarray, scaling: Scaling) -> np.ndarray:
+    """Return one column in SI, NaN where a sample is missing; refuse what no valve gives."""
+    with np.errstate(over="ignore", invalid="ignore"):  # an infinity is refused below
+        numbers = numbers * scaling.gain
+        numbers += scaling.offset
+    largest = LARGEST[QUANTITY_OF_COLUMN[quantity]]
+    if np.fmax.reduce(numbers, initial=0.0) > largest or np.fmin.reduce(numbers, initial=0.0) < -largest:
+        row = int(np.flatnonzero(np.abs(numbers) > largest)[0])
+        raise InputError(
+            f"'{table.path}' {table.place(row)}, column '{column.label}': "
+            f"'{table.cell(column.label, row)[:QUOTED_CHARACTERS]}' is no measurement of a valve in that unit; "
+            "correct it, or leave the cell blank if the sample is missing"
+        )
+    return numbers
 
 
 def _of_range(quantity: str, column: Column, u_max: float) -> Scaling:
@@ -184,3 +231,96 @@ def range_example(quantity: str, label: str, unit: str) -> str:
     """
     signal = "4..20" if measures(unit, "current") else "0..10"
     return f'for example --columns "{quantity}={label}:{signal} {unit} = {_full_scale(quantity)}"'
+
+
+# the units for a reader
+
+
+def units_of_columns(
+    path: Path, found: Mapping[str, Column], command: Scaling, u_max: float
+) -> dict[Quantity, tuple[Unit, ...]]:
+    """Return the units of a recording's columns, by quantity, with the command's scaling; 100 % of it is `u_max`, V."""
+    pressures = (pressure_unit(found[name].unit) for name in PRESSURES if name in found)
+    units: dict[Quantity, tuple[Unit, ...]] = {
+        "command": (_command_unit(path, found["u"], command, u_max),),
+        "pressure": tuple(dict.fromkeys(unit for unit in pressures if unit)),
+        "flow": tuple(unit for unit in (_flow_unit(found["Q"].unit),) if unit),
+    }
+    return {name: known for name, known in units.items() if known}
+
+
+def units_of(tests: Sequence[RampTest]) -> RecordedUnits:
+    """Return the units of recordings: of each quantity that in which all stand, or else V, MPa or L/min."""
+    every: dict[Quantity, tuple[Unit, ...]] = {}
+    for test in tests:
+        for name, units in test.units.items():
+            every[name] = (*every.get(name, ()), *units)
+    return common_units(every)
+
+
+def pressure_unit(text: str) -> PressureUnit | None:
+    """Return a unit of pressure, or that of what a transmitter's range means; None if there is none."""
+    unit = _meant(text)
+    if not measures(unit, "pressure"):
+        return None
+    factor = significant(MPA / si_factor(unit, "pressure"))
+    return PressureUnit() if factor == 1 or _extreme(factor) else PressureUnit(unit=name_of_unit(unit), factor=factor)
+
+
+def unit_of_pressure(text: str) -> dict[Quantity, tuple[Unit, ...]]:
+    """Return the unit of a declared pressure drop, such as ``20 bar``, as that of a recording without a column of it.
+
+    Examples
+    --------
+    >>> unit_of_pressure("20 bar")
+    {'pressure': (PressureUnit(unit='bar', factor=10.0),)}
+    """
+    unit = pressure_unit(text.lstrip(NOT_OF_A_UNIT))
+    return {"pressure": (unit,)} if unit else {}
+
+
+def _flow_unit(text: str) -> FlowUnit | None:
+    unit = _meant(text)
+    if not measures(unit, "flow"):
+        return None
+    factor = significant(L_MIN / si_factor(unit, "flow"))
+    return FlowUnit() if factor == 1 or _extreme(factor) else FlowUnit(unit=name_of_unit(unit), factor=factor)
+
+
+def _meant(unit: str) -> str:
+    """Return what a transmitter's signal stands for: nobody reads a flow in milliamperes."""
+    return unit.rpartition("=")[2].lstrip(NOT_OF_A_UNIT).strip() if "=" in unit else unit.strip()
+
+
+def _extreme(factor: float) -> bool:
+    """Whether a unit is none that a person reads a valve's quantity in."""
+    return not SMALLEST_FACTOR <= abs(factor) <= LARGEST_FACTOR
+
+
+def _command_unit(path: Path, column: Column, scaling: Scaling, u_max: float) -> CommandUnit:
+    """Return the unit of a command: that of the signal as it is declared, or else the column's own.
+
+    A range of volts that stands for other volts, or for percent, is shown in what it stands for: two kinds of volts
+    in one table would be taken for one another.
+    """
+    unit, declared = column.unit.strip(), ""
+    signal = read_signal_range(unit, "u", points=True) if "=" in unit else None
+    if signal is not None and signal.meaning is not None:
+        declared = " ".join(unit.split())
+        low, high = float(signal.low), float(signal.high)
+        name = signal.unit or column.stated or column.label
+        means = signal.meaning
+        factor = scaling_of(path, "u", Column(label=column.label, unit=means.unit), u_max).gain
+        bottom, top = float(means.bottom) * factor, float(means.top) * factor
+        gain = (top - bottom) / (high - low)
+        if measures(name, "voltage"):
+            scaling, unit, declared = Scaling(gain=factor), means.unit, ""
+        else:
+            scaling, unit = Scaling(gain=gain, offset=bottom - gain * low), name
+    unit = name_of_unit(unit)
+    factor, at_zero = significant(1 / scaling.gain), significant(-scaling.offset / scaling.gain)
+    if column.less is not None and at_zero:  # the difference of two currents from 4 mA on is none of that range
+        return CommandUnit()
+    if not unit or _extreme(factor) or (measures(unit, "voltage") and (factor, at_zero) == (1.0, 0.0)):
+        return CommandUnit()
+    return CommandUnit(unit=unit, factor=factor, at_zero=at_zero + 0.0, declared=declared)

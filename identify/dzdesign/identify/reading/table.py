@@ -73,9 +73,8 @@ class Table(ABC):
     #: Of columns that were read: what stood there for no value.
     marked: dict[str, Missing] = field(default_factory=dict)
 
-    @abstractmethod
-    def load(self, labels: Collection[str]) -> None:
-        """Read columns at once, which takes less time than one after the other by `numbers`."""
+    def load(self, labels: Collection[str]) -> None:  # noqa: B027
+        """Read columns at once, where that takes less time than one after the other by `numbers`."""
 
     @abstractmethod
     def numbers(self, label: str) -> np.ndarray:

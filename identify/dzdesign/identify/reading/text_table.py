@@ -7,7 +7,6 @@ are far larger: then it is refused, for nothing tells which it is, but where the
 
 import re
 from collections.abc import Collection, Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, final
 
@@ -15,7 +14,7 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.reading.missing_values import NO_VALUE, without_markers
-from dzdesign.identify.reading.table import AND, QUOTED_CHARACTERS, Table
+from dzdesign.identify.reading.table import AND, QUOTED_CHARACTERS, Table, clean_label
 from dzdesign.identify.reading.time_stamps import (
     DATE_OF_A_NUMBER,
     EXAMPLE,
@@ -38,8 +37,6 @@ DATE_LABEL = re.compile(r"(?:log|mess|test)?[ _-]?(?:date|datum)|day|tag|fecha|d
 DATE = re.compile(r"\d[-/.:]\d+[-/.:]\d")
 #: A number with its unit.
 WITH_UNIT = re.compile(r"[-+]?[\d.,]*\d(?:[eE][-+]?\d+)?\s?((?![eE]$)[^\W\d_][^\s\d]{0,9}|%)")
-#: A cell whose column most likely holds nothing but numbers.
-PLAIN_NUMBER = re.compile(r"\s*[-+]?[\d.]+([eE][-+]?\d+)?")
 #: What stands between thousands and is no decimal mark anywhere: a blank, a narrow or hard one, an apostrophe.
 BETWEEN_THOUSANDS = " \u00a0\u202f'\u2019"
 #: A number with any decimal mark, or with blanks or the like between thousands.
@@ -67,42 +64,34 @@ ADVICE = "export numbers with one mark and no separator of thousands"
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TextTable(Table):
-    """A table of text: its rows as they stand in the file, and where they stand in it.
+    """A table of text: its cells as they stand in the file, and where they stand in it.
 
     Attributes
     ----------
-    rows : bytes
-        UTF-8; each line has as many cells as there are labels.
-    separator : str
-        Between two cells.
+    cells : DataFrame
+        A column of texts for each label, in their order; of numbers where a header states times by start and step, and
+        where they were read.
     header_line : int
         Number of the header's line.
-    lines : range or (N,) array of int
+    lines : (N,) array of int
         Numbers of the rows' lines.
-    computed : mapping
-        Label of a column of time -> its seconds, (N,), which the file states by start and step; such columns may follow
-        those of the file.
     starts : mapping
         Label of a column of time -> date and time at which it counts zero, where a header states it.
-    width : int
-        Cells of a row; 0 for as many as there are labels.
     missing : collection of str
         What stands for no value by the engineer's word.
     """
 
-    rows: bytes
-    separator: str
+    cells: "pl.DataFrame"
     header_line: int
-    lines: range | np.ndarray
-    computed: Mapping[str, np.ndarray] = field(default_factory=dict)
+    lines: np.ndarray
     starts: Mapping[str, str] = field(default_factory=dict)
-    width: int = 0
     missing: Collection[str] = ()
-    _loaded: "dict[str, pl.Series]" = field(default_factory=dict)
     #: What columns that were read have shown: label -> decimal mark, a cell that shows it; and label -> mark that may
     #: be one between thousands, a cell with it, where that stands.
     _certain: dict[str, tuple[str, str]] = field(default_factory=dict)
     _doubtful: dict[str, tuple[str, str, str]] = field(default_factory=dict)
+    #: First cells of columns that were looked at.
+    _firsts: dict[str, str] = field(default_factory=dict)
 
     @property
     def header(self) -> str:
@@ -119,67 +108,43 @@ class TextTable(Table):
 
     def cell(self, label: str, row: int) -> str:
         """Return a cell as it stands in the file."""
-        if label in self.computed:
-            return f"{self.computed[label][row]:g}"
-        return str(self._texts(label, row + 1)[row])
-
-    def load(self, labels: Collection[str]) -> None:
-        """Read at once those columns that begin with a number, if they hold nothing else."""
-        import polars as pl
-
-        cells = self.rows[: max(self.rows.find(b"\n"), 0) or None].decode().split(self.separator)
-        likely = [
-            label
-            for label in labels
-            if len(self.lines)
-            and label in self.labels
-            and label not in self.computed
-            and PLAIN_NUMBER.fullmatch(cells[self.labels.index(label)])
-        ]
-        if likely:
-            with suppress(pl.exceptions.PolarsError):  # a cell is not a number
-                self._loaded.update(self._read(dict.fromkeys(likely, pl.Float64)))
+        cell = self.cells[row, self.labels.index(label)] if label in self.labels else self._texts(label)[row]
+        return clean_label(cell) if isinstance(cell, str) else f"{cell:g}"
 
     def numbers(self, label: str) -> np.ndarray:
         """Return a column as float64, NaN where the cell is blank."""
         import polars as pl
 
-        if label in self.computed:
-            return self.computed[label]
-        if label not in self._loaded:
-            self.load([label])
-        if label in self._loaded:
-            loaded = self._loaded.pop(label)  # a second copy of a long recording would double the memory
-            read = np.asarray(loaded.fill_null(np.nan).to_numpy())
-            if not self._shows_points(label, read):
-                self._with_points(label, self._texts(label))  # may refuse it
-            return read
-        texts, self.marked[label] = without_markers(self._texts(label), self.missing)
-        # Before anything is said of its decimal mark: 05. Mrz, 5.0 mV.
-        strange = (texts.str.contains(r"[\p{L}--[eE]]") & ~texts.str.contains("(?i)^[-+]?nan$")).fill_null(False)
-        if len(row := strange.arg_true().head(1)):
-            raise self._no_number(label, int(row[0]), texts[int(row[0])])
+        place = self.labels.index(label)
+        if self.cells.to_series(place).dtype == pl.Float64:
+            return np.asarray(self.cells.to_series(place).to_numpy())
+        texts = self._texts(label)
+        numbers = texts.cast(pl.Float64, strict=False)
+        if (numbers.is_null() & (texts != "")).any():
+            texts, self.marked[label] = without_markers(texts, self.missing)
+            # Before anything is said of its decimal mark: 05. Mrz, 5.0 mV.
+            strange = texts.str.contains(r"[\p{L}--[eE]]") & ~texts.str.contains("(?i)^[-+]?nan$")
+            self._refuse_one(label, texts, strange)
         column = self._with_points(label, texts)
-        numbers = column.cast(pl.Float64, strict=False)
-        filled = ~(column.is_null() | (column == ""))
-        if (filled & numbers.is_null()).any():
+        if column is not texts:
+            numbers = column.cast(pl.Float64, strict=False)
+        if (numbers.is_null() & (column != "")).any():
             numbers = numbers.fill_null(_plainly_written(column).cast(pl.Float64, strict=False))
-        bad = (filled & numbers.is_null()).arg_true()
-        if len(bad):
-            raise self._no_number(label, int(bad[0]), texts[int(bad[0])])
-        return np.asarray(numbers.fill_null(np.nan).to_numpy())
+            self._refuse_one(label, texts, numbers.is_null() & (column != ""))
+        self.cells.replace_column(place, numbers.fill_null(np.nan))  # both would double the memory of a long recording
+        return np.asarray(self.cells.to_series(place).to_numpy())
 
     def two_values(self, label: str) -> tuple[tuple[str, str], np.ndarray] | None:
         """Return the two texts that a column holds, and where it holds the second; None if it holds others."""
-        if self._texts(label, FEW_ROWS).n_unique() > 2:
-            return None
         texts = self._texts(label)
-        values = [str(text) for text in texts.drop_nulls().unique().sort() if text]
-        return ((values[0], values[1]), (texts == values[1]).fill_null(False).to_numpy()) if len(values) == 2 else None
+        if texts.head(FEW_ROWS).n_unique() > 2:
+            return None
+        values = [str(text) for text in texts.unique().sort() if text]
+        return ((values[0], values[1]), (texts == values[1]).to_numpy()) if len(values) == 2 else None
 
     def is_clock(self, label: str) -> bool:
         """Tell whether the first cell of a column that is not blank holds a time of day."""
-        cell = "" if label in self.computed else self._first(label)
+        cell = self._first(label)
         if is_unclear(cell):
             raise InputError(
                 f"'{self.path}' column '{label}': '{cell}' is ambiguous, as it may be hours and minutes, minutes and "
@@ -197,13 +162,9 @@ class TextTable(Table):
 
         Any other date, as of a calibration, would give the recordings a false order.
         """
-        if label not in self.labels or label in self.computed or not is_time_of_day(self._first(label)):
+        if label not in self.labels or not is_time_of_day(self._first(label)):
             return label
-        import polars as pl
-
-        columns = self._read({each: pl.String for each in self.labels[: self.width or None]}, FEW_ROWS)
-        called = [each for each in self.labels if DATE_LABEL.fullmatch(each)]
-        dates = [each for each in called if is_date(_first_filled(_cells(columns[each])))]
+        dates = [each for each in self.labels if DATE_LABEL.fullmatch(each) and is_date(self._first(each))]
         both = f"{dates[0]}{AND}{label}" if len(dates) == 1 else label
         return label if both in self.labels else both
 
@@ -216,10 +177,8 @@ class TextTable(Table):
             return None
         parts = text.split(AND)
         for at in range(1, len(parts)):
-            one, other = AND.join(parts[:at]), AND.join(parts[at:])
-            if one not in self.labels or other not in self.labels:
-                continue
-            for dates, times in ((one, other), (other, one)):
+            pair = AND.join(parts[:at]), AND.join(parts[at:])
+            for dates, times in (pair, pair[::-1]) if set(pair) <= set(self.labels) else ():
                 if is_date(self._first(dates)) and is_time_of_day(self._first(times)):
                     return dates, times
         return None
@@ -234,7 +193,7 @@ class TextTable(Table):
         """Return a column of dates or times of day as seconds since the first row of the file."""
         texts, self.marked[label] = without_markers(self._texts(label), self.missing)
         seconds = seconds_of_stamps(texts, f"'{self.path}' column '{label}'")
-        bad = np.flatnonzero((~(texts.is_null() | (texts == ""))).to_numpy() & np.isnan(seconds))
+        bad = np.flatnonzero((texts != "").to_numpy() & np.isnan(seconds))
         if bad.size:
             row = int(bad[0])
             raise InputError(
@@ -244,56 +203,32 @@ class TextTable(Table):
         return seconds
 
     def _first(self, label: str) -> str:
-        """Return the first cell of a column that is not blank."""
-        for rows in (FEW_ROWS, None):
-            if first := _first_filled(self._texts(label, rows)):
-                return first
-        return ""
+        """Return the first cell of a column that is not blank, nor stands for no value."""
+        for rows in (FEW_ROWS, None) if label not in self._firsts else ():
+            texts = self._texts(label, rows)
+            filled = texts.filter((texts != "") & ~texts.str.contains(NO_VALUE)).head(1)
+            self._firsts[label] = str(filled[0]) if len(filled) else ""
+            if len(filled):
+                break
+        return self._firsts[label]
 
     def _texts(self, label: str, rows: int | None = None) -> "pl.Series":
-        """Return the first cells of a column as they stand in the file, or all of them."""
+        """Return the cells of a column, or the first ones, as they stand in the file, without blanks and quotes."""
         import polars as pl
 
         pair = self.pair(label)
         if pair is None:
-            return _cells(self._read({label: pl.String}, rows)[label])
+            cells = self.cells.to_series(self.labels.index(label)).head(self.cells.height if rows is None else rows)
+            return cells.cast(pl.String).str.strip_chars(' \t"')
         dates, times = (self._texts(each, rows).str.replace("^'", "") for each in pair)
         # A date that is written once holds for the rows below it.
         dates = dates.set(dates == "", None).fill_null(strategy="forward").fill_null(strategy="backward")
-        return (dates + " " + times).zip_with((times != "").fill_null(False), times)
+        return (dates + " " + times).zip_with(times != "", times)
 
-    def _read(self, types: "dict[str, type[pl.DataType]]", rows: int | None = None) -> "dict[str, pl.Series]":
-        import polars as pl
-
-        if len(self.lines) == 0:
-            return {label: pl.Series(label, [], dtype=kind) for label, kind in types.items()}
-        columns = {self.labels.index(label): kind for label, kind in types.items()}
-        schema = {f"c{index}": columns.get(index, pl.String) for index in range(self.width or len(self.labels))}
-        try:
-            frame = pl.read_csv(
-                self.rows, separator=self.separator, has_header=False, schema=schema, columns=sorted(columns),
-                quote_char=None, n_rows=rows,
-            )  # fmt: skip
-        except pl.exceptions.PolarsError as error:
-            if pl.Float64 in types.values():
-                raise
-            raise InputError(f"'{self.path}' can't be read as a table: {str(error).splitlines()[0]}") from error
-        if rows is None and frame.height != len(self.lines):
-            raise InputError(
-                f"'{self.path}' can't be read as a table: {len(self.lines)} rows of samples read as {frame.height}"
-            )
-        return {label: frame[f"c{self.labels.index(label)}"] for label in types}
-
-    def _shows_points(self, label: str, numbers: np.ndarray) -> bool:
-        """Tell whether a column that was read with decimal points has one that stands between no thousands."""
-        for some in (numbers[:FEW_ROWS], numbers):
-            parts = np.abs(some[np.isfinite(some) & (some != np.rint(some))])
-            # In a decimal below 1, from 1000 on or with four digits behind it.
-            plain = parts[(parts < 1) | (parts >= 1000) | (np.abs(1e3 * parts - np.rint(1e3 * parts)) > 1e-6)]
-            if plain.size:
-                self._take_mark(label, ".", f"{plain[0]:g}")
-                return True
-        return False
+    def _refuse_one(self, label: str, texts: "pl.Series", wrong: "pl.Series") -> None:
+        """Refuse the first cell that is no number, if there is one."""
+        for row in wrong.arg_true().head(1):
+            raise self._no_number(label, row, texts[row])
 
     def _with_points(self, label: str, texts: "pl.Series") -> "pl.Series":
         """Return numbers with a decimal point, whatever their decimal mark is, and without one between thousands.
@@ -303,12 +238,12 @@ class TextTable(Table):
         InputError
             If which mark is the decimal one can't be told.
         """
-        point, comma = (texts.str.contains(mark, literal=True).fill_null(False) for mark in ".,")
+        point, comma = (texts.str.contains(mark, literal=True) for mark in ".,")
         if point.any() and comma.any():
             both = texts.filter(comma & point)
             cell = both[0] if len(both) else texts.filter(comma)[0]
             decimal = max(",.", key=cell.rfind)
-            wrong = (~texts.str.contains(GROUPED[decimal]).fill_null(True) & (texts != "")).arg_true()
+            wrong = (~texts.str.contains(GROUPED[decimal]) & (texts != "")).arg_true()
             if not len(both) or len(wrong):
                 row = int(wrong[0]) if len(wrong) else int(point.arg_true()[0])
                 why = f"stands in one column with '{cell[:QUOTED_CHARACTERS]}', so which mark is the decimal one can't"
@@ -317,8 +252,8 @@ class TextTable(Table):
             return texts.str.replace_all(OTHER[decimal], "", literal=True).str.replace(decimal, ".", literal=True)
         mark = "," if comma.any() else "."
         for some in (texts.head(FEW_ROWS), texts):
-            marked = some.str.contains(WITH_MARK[mark]).fill_null(False)
-            plain = (marked & ~some.str.contains(DOUBTFUL[mark]).fill_null(False)).arg_true()
+            marked = some.str.contains(WITH_MARK[mark])
+            plain = (marked & ~some.str.contains(DOUBTFUL[mark])).arg_true()
             if len(plain):
                 self._take_mark(label, mark, some[int(plain[0])])
                 break
@@ -350,7 +285,7 @@ class TextTable(Table):
 
         numbers = texts.str.replace(mark, ".", literal=True).cast(pl.Float64, strict=False).abs()
         row = int(numbers.set(~marked, None).arg_min() or 0)
-        whole = numbers.set(marked | ~texts.str.contains(r"^[-+]?\d+$").fill_null(False), None).arg_max()
+        whole = numbers.set(marked | ~texts.str.contains(r"^[-+]?\d+$"), None).arg_max()
         if whole is None or numbers[whole] < max(LEAST_WHOLE, FAR_LARGER * numbers[row]):
             return
         beside = f"stands in one column with '{texts[whole][:QUOTED_CHARACTERS]}'"
@@ -385,19 +320,8 @@ def _without_marks(cell: str) -> str:
     return re.sub("[.,]", "", cell)[:QUOTED_CHARACTERS]
 
 
-def _cells(texts: "pl.Series") -> "pl.Series":
-    """Return cells without blanks and quotes around them."""
-    return texts.str.strip_chars(' \t"')
-
-
-def _first_filled(texts: "pl.Series") -> str:
-    """Return the first text that is not blank, nor stands for no value."""
-    filled = texts.filter(texts.is_not_null() & (texts != "") & ~texts.str.contains(NO_VALUE))
-    return str(filled[0]) if len(filled) else ""
-
-
 def _plainly_written(numbers: "pl.Series") -> "pl.Series":
     """Return numbers with a decimal point without blanks behind a sign or between thousands, and with a plain minus."""
     signed = numbers.str.replace("^\u2212", "-").str.replace(r"^([-+])\s", "${1}")
-    grouped = signed.str.contains(rf"^[-+]?\d{{1,3}}(?:[{BETWEEN_THOUSANDS}]\d{{3}})+(?:\.\d*)?$").fill_null(False)
+    grouped = signed.str.contains(rf"^[-+]?\d{{1,3}}(?:[{BETWEEN_THOUSANDS}]\d{{3}})+(?:\.\d*)?$")
     return signed.str.replace_all(f"[{BETWEEN_THOUSANDS}]", "").zip_with(grouped, signed)

@@ -141,29 +141,40 @@ def seconds_of_stamps(cells: "pl.Series", where: str) -> np.ndarray:
     """
     import polars as pl
 
-    plain = cells
-    for pattern, usual in SPELLINGS:
-        plain = plain.str.replace(pattern, usual)
-    parts = plain.str.extract_groups(STAMP).struct.unnest()
-    days, date, hour, minute, second, half, zone = (parts.to_series(index) for index in range(7))
-    number = pl.Float64
-    hours = hour.cast(number, strict=False)
-    if half.null_count() < half.len():  # 12 AM is midnight, 12 PM noon
-        afternoon = half.str.to_lowercase() == "p"
-        hours = (hours % 12) + 12.0 * afternoon.cast(number).fill_null(0.0)
-    point = second.str.replace(r"[,:]", ".").cast(number, strict=False)
-    of_day = 3600.0 * hours + 60.0 * minute.cast(number, strict=False) + point
-    seconds: np.ndarray = (of_day + DAY * days.cast(number, strict=False).fill_null(0.0)).fill_null(np.nan).to_numpy()
-    if zone.null_count() < zone.len():
-        seconds = seconds - _replaced(zone, {text: _zone(text) for text in _different(zone)})
+    parts = _all_parts(cells)
+    days, date = parts.to_series(0), parts.to_series(1)
+    seconds = np.asarray((_of_day(parts) + DAY * days.cast(pl.Float64).fill_null(0.0)).fill_null(np.nan).to_numpy())
     if date.null_count() < date.len():
-        seconds = seconds + _replaced(date, _days_since_the_first(_different(date), where))
+        different = list(date.unique(maintain_order=True).drop_nulls())  # the first of the file first; there are few
+        days_of = _days_since_the_first(different, where)
+        seconds = seconds + date.replace_strict(days_of, default=0.0, return_dtype=pl.Float64).fill_null(0.0).to_numpy()
     else:
         seconds = _over_midnight(seconds)
     if np.isnan(seconds).any():
         seconds = np.where(np.isnan(seconds), _durations(cells), seconds)
     known = seconds[np.isfinite(seconds)]
     return seconds - known[0] if known.size else seconds
+
+
+def _all_parts(cells: "pl.Series") -> "pl.DataFrame":
+    """Return the parts of stamps, however they are spelled, a column each; null where a cell is none."""
+    for pattern, usual in SPELLINGS:
+        cells = cells.str.replace(pattern, usual)
+    return cells.str.extract_groups(STAMP).struct.unnest()
+
+
+def _of_day(parts: "pl.DataFrame") -> "pl.Series":
+    """Return the seconds of the day at which stamps are, in UTC where they state a zone; null where a cell is none."""
+    import polars as pl
+
+    hour, minute, second, half, zone = (parts.to_series(index) for index in range(2, 7))
+    hours = hour.cast(pl.Float64)
+    afternoon = (half.str.to_lowercase() == "p").cast(pl.Float64).fill_null(0.0)
+    hours = hours.zip_with(half.is_null(), hours % 12 + 12 * afternoon)  # 12 AM is midnight, 12 PM noon
+    ahead, minutes = (zone.str.extract(part).cast(pl.Float64).fill_null(0.0) for part in (r"^([-+]\d\d)", r"(\d\d)$"))
+    zone_minutes = minutes.zip_with(~zone.str.starts_with("-").fill_null(False), -minutes)
+    hours, minute = hours - ahead, minute.cast(pl.Float64) - zone_minutes
+    return 3600.0 * hours + 60.0 * minute + second.str.replace(r"[,:]", ".").cast(pl.Float64)
 
 
 def start_of(cell: str) -> Start | None:
@@ -174,14 +185,14 @@ def start_of(cell: str) -> Start | None:
     >>> start_of("2026-11-22 03:04:05").seconds - start_of("22.11.2026 03:04:04,5").seconds, start_of("03:04:05")
     (0.5, None)
     """
+    import polars as pl
+
     found = _parts(cell) if len(cell) <= LONGEST_STAMP else None
     days = set(_days(found[2]).values()) if found and found[2] else set()
     if found is None or len(days) != 1:
         return None
-    _, _, hour, minute, second, half, zone = found.groups()
-    hours = int(hour) % 12 + 12 * (half in ("P", "p")) if half else int(hour)
-    of_day = 3600.0 * hours + 60.0 * int(minute) + float(re.sub("[,:]", ".", second))
-    return Start(DAY * days.pop() + of_day - (_zone(zone) if zone else 0.0), has_zone=bool(zone))
+    of_day = float(_of_day(_all_parts(pl.Series([cell])))[0])
+    return Start(DAY * days.pop() + of_day, has_zone=bool(found[7]))
 
 
 def _durations(cells: "pl.Series") -> np.ndarray:
@@ -195,18 +206,6 @@ def _durations(cells: "pl.Series") -> np.ndarray:
         seconds += factor * part.cast(pl.Float64, strict=False).fill_null(0.0).to_numpy()
     sign = np.where(texts.str.contains("^(?:[a-z]+#)?-").fill_null(False).to_numpy(), -1.0, 1.0)
     return np.where(cells.str.contains(DURATION).fill_null(False).to_numpy(), sign * seconds, np.nan)
-
-
-def _different(texts: "pl.Series") -> list[str]:
-    """Return the different texts, the first of the file first; there are few."""
-    return list(texts.unique(maintain_order=True).drop_nulls())
-
-
-def _replaced(texts: "pl.Series", numbers: dict[str, float]) -> np.ndarray:
-    """Return the number that each text means, 0 where there is none."""
-    import polars as pl
-
-    return np.asarray(texts.replace_strict(numbers, default=0.0, return_dtype=pl.Float64).fill_null(0.0).to_numpy())
 
 
 def _over_midnight(seconds: np.ndarray) -> np.ndarray:
@@ -249,11 +248,3 @@ def _days(date: str) -> dict[str, int]:
         with suppress(ValueError):
             found[form] = datetime.datetime.strptime(numbers, form).toordinal()
     return found
-
-
-def _zone(text: str) -> float:
-    """Return by how many seconds a zone is ahead of UTC."""
-    if text[0] not in "+-":
-        return 0.0
-    digits = text[1:].replace(":", "")
-    return (1 if text[0] == "+" else -1) * (3600.0 * int(digits[:2]) + 60.0 * int(digits[2:]))
