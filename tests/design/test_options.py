@@ -194,18 +194,14 @@ def test_the_words_of_a_machine_are_the_declared_numbers():
 
 def test_a_valve_that_lacks_what_is_asked_for_is_refused(example_valve, wording):
     without_opening = dataclasses.replace(example_valve.positive, opening_curve=None)
-    with pytest.raises(InputError) as caught:
+    with wording.refusal(InputError, "design: a transition without an opening branch"):
         designed(dataclasses.replace(example_valve, sides={"positive": without_opening}), transition="1 %")
-    wording("design: a transition without an opening branch", str(caught.value))
-    with pytest.raises(InputError) as caught:
+    with wording.refusal(InputError, "design: an untested side"):
         designed(example_valve, command_signal=BOTH_SIGNS)
-    wording("design: an untested side", str(caught.value))
-    with pytest.raises(InputError) as caught:
+    with wording.refusal(InputError, "design: no positive side"):
         design(dataclasses.replace(example_valve, sides={"negative": example_valve.positive}))
-    wording("design: no positive side", str(caught.value))
-    with pytest.raises(InputError) as caught:
+    with wording.refusal(InputError, "design: a short span"):
         designed(example_valve, pressure_span="4 MPa")
-    wording("design: a short span", str(caught.value))
 
 
 def test_a_valve_without_an_opening_branch_has_no_transition_unless_asked(example_valve):
