@@ -8,12 +8,12 @@ from dzdesign.codegen.other_targets import generate_output, settings_of
 from dzdesign.codegen.writing import write_generated
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_types import to_json_bytes
-from tests.support.paths import GOLDENS
+from tests.support.golden_firmware import golden_valve
 
 
 @pytest.fixture(scope="module")
 def compensator():
-    return api.design(GOLDENS / "valve.json")
+    return api.design(golden_valve())
 
 
 @pytest.fixture

@@ -21,12 +21,9 @@ from dzdesign.codegen.other_targets import ALL_TARGET_NAMES, OTHER_TARGETS
 from dzdesign.codegen.project import TARGET_NAMES, generate, target_named
 from dzdesign.codegen.target import folder_of
 from dzdesign.command_line.cli import main
-from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.errors import DzdesignError, InputError
-from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
 from tests.support.golden_firmware import GOLDENS, golden_compensator
 from tests.support.paths import ROOT
-from tests.support.synthetic import needs_compiler
 
 VALVE = GOLDENS / "valve.json"
 CODEGEN = ROOT / "codegen" / "dzdesign" / "codegen"
@@ -141,16 +138,6 @@ def test_a_compensator_of_another_target_is_refused_with_the_way_out(wording):
         generate(golden_compensator("f28335"), "f280049c")
     for name in ("host", "cortex-m4"):  # these have no converter and timer of their own
         assert "DZ_COMPARE_MAX 40000u" in generate(golden_compensator("f280049c"), name).files["core/dz_calibration.h"]
-
-
-@pytest.mark.slow
-@needs_compiler
-def test_the_core_is_exact_on_every_input_for_another_pwm(tmp_path):
-    firmware = generate(golden_compensator("f280049c"), "f280049c")
-    write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
-    result = check_all_inputs(tmp_path / "fw")
-    # Every command at each difference of two sound pressures, 688 to 4014.
-    assert result.holds and result.wrong == 0 and result.inputs == 4096 * (2 * (4014 - 688) + 1)
 
 
 @pytest.mark.parametrize("name", ["cortex_m4", "Cortex-M4", "-m4"])

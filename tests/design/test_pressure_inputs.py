@@ -5,13 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
 from dzdesign.design.pressure_inputs import hidden_failure, wiring_in_words
-from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.recorded_drop import DropColumns, RecordedDrop
 from tests.support.designs import BOTH_SIGNS, designed
-from tests.support.golden_firmware import FULL
+from tests.support.golden_firmware import FULL, golden_valve
 from tests.support.repeatable_valves import identify
 from tests.support.synthetic import Truth, synthetic_ramp
 
@@ -28,7 +26,7 @@ AB, DP = ("pA", "pB"), ("dP",)
 
 @pytest.fixture(scope="module")
 def two_sides():
-    return read_artefact((FULL / "valve.json").read_bytes(), ValveModel, "valve.json")
+    return golden_valve(FULL)
 
 
 def designed_as(valve, positive, negative, choice="", **texts):

@@ -7,12 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from dzdesign.codegen.project import target_named
-from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.recorded_units import AS_COMPUTED
-from dzdesign.design.designing import design
-from dzdesign.design.options import options_of
-from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.artefacts import Chain, standing_warnings
 from dzdesign.report.sections.closed_loop import scenarios_table
 from dzdesign.report.sections.provenance import warnings_section
@@ -23,29 +18,21 @@ from dzdesign.report.valve_report import REPORT_NAME
 from dzdesign.verify.closed_loop.drive_corners import NOT_DECLARED
 from dzdesign.verify.closed_loop.scene import NO_CORE_CAN_KNOW
 from dzdesign.verify.loop_results import ScenarioResult
+from tests.support.designs import BOTH_SIGNS, designed
 from tests.support.evidence import LOOP, evidence_with, pressure_result, read_evidence
-from tests.support.golden_firmware import FULL
+from tests.support.golden_firmware import FULL, golden_valve
 from tests.support.paths import ROOT
 from tests.support.synthetic import needs_compiler
 
-BOTH_SIGNS = "-10..10 V x 0.15 + 1.5 V"
 RUN = ScenarioResult(
     name="sensor A is stuck", side="positive", dp_MPa=1.0, back_MPa=0.0, leak_L_min=0.0, allowed_at_zero_L_min=None,
     unseen_below_L_min=None, q_zero_L_min=0.0, q_peak_at_zero_L_min=0.0, must_shut=True, not_required="", figures={},
 )  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def both_sides():
-    return read_artefact((FULL / "valve.json").read_bytes(), ValveModel, "valve.json")
-
-
-def designed(valve, **texts):
-    return design(valve, options_of(texts, target_named("f28335").inputs()))
-
-
-def test_a_side_that_is_driven_is_not_said_to_be_left_out(both_sides):
+def test_a_side_that_is_driven_is_not_said_to_be_left_out():
     """Seeded: the report of a firmware for commands of both signs warned that it drives one side."""
+    both_sides = golden_valve(FULL)
     one, both = designed(both_sides), designed(both_sides, command_signal=BOTH_SIGNS)
     for compensator, said in ((one, True), (both, False), (None, True)):
         ((_, lines), *_) = warnings_section(both_sides, compensator).groups

@@ -8,12 +8,9 @@ from markupsafe import Markup
 
 from dzdesign.assess.assessing import assess
 from dzdesign.assess.options import AssessOptions
-from dzdesign.codegen.project import target_named
 from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.design.costs import lines_of_tests
 from dzdesign.design.costs_at_tests import costs_at_tests
-from dzdesign.design.designing import design
-from dzdesign.design.options import options_of
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.report.figure import figure_style
 from dzdesign.report.page import Headline, Page, _cell, _finding, _tied, render
@@ -79,12 +76,8 @@ def test_a_range_whose_ends_read_alike_is_none(values, text):
     assert with_span(values) == text
 
 
-@pytest.fixture(scope="module")
-def compensator(example_valve):
-    return design(example_valve, options_of({}, target_named("f28335").inputs()))
-
-
-def test_what_a_design_leaves_stands_in_a_table_and_nowhere_twice(compensator):
+def test_what_a_design_leaves_stands_in_a_table_and_nowhere_twice(example_compensator):
+    compensator = example_compensator
     (table,) = remaining_section(compensator).tables
     costs = costs_at_tests(compensator, 1)
     assert len(table.rows) == len(costs) == len(lines_of_tests(compensator, 1))

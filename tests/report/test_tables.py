@@ -6,11 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from dzdesign.codegen.project import target_named
 from dzdesign.core.recorded_units import AS_COMPUTED, PressureUnit
 from dzdesign.design.certificate import not_counted
-from dzdesign.design.designing import design
-from dzdesign.design.options import options_of
 from dzdesign.report.sections.closed_loop import current_tables
 from dzdesign.report.sections.law import budget_section
 from dzdesign.verify.current.results import (
@@ -19,17 +16,14 @@ from dzdesign.verify.current.results import (
     CurrentLoopResult,
     FaultRun,
 )
+from tests.support.designs import designed
 
 DECLARED = {"coil_temperature": "-20..80 degC", "supply": "18..32 V", "oil": "0.4 %"}
 
 
-def designed(valve, texts, target="f28335"):
-    return design(valve, options_of(texts, target_named(target).inputs()))
-
-
 @pytest.fixture(scope="module")
 def machine(example_valve):
-    return designed(example_valve, DECLARED)
+    return designed(example_valve, **DECLARED)
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +50,7 @@ def test_every_component_stands_in_the_table_with_its_origin(machine, section):
 def test_a_sensitivity_times_its_half_width_is_the_contribution_in_any_units(machine, example_valve):
     """Seeded: of a half-width that is shown in bar the sensitivity per MPa would be ten times too large."""
     chosen = replace(AS_COMPUTED, pressure=PressureUnit(unit="bar", factor=10.0))
-    of_bar = designed(replace(example_valve, recorded_units=chosen), DECLARED)
+    of_bar = designed(replace(example_valve, recorded_units=chosen), **DECLARED)
     for compensator, unit in ((machine, "MPa"), (of_bar, "bar")):
         table = budget_section(compensator).tables[0]
         row = next(row for row in table.rows if row[0].text == "pressure sensor A")

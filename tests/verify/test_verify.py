@@ -2,7 +2,6 @@
 
 import json
 import re
-from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -14,7 +13,6 @@ from dzdesign.verify.closed_loop.plant import Plant
 from dzdesign.verify.closed_loop.ramps import dead_zone
 from dzdesign.verify.closed_loop.scene import scenes_of
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
-from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.folder import Regenerated, read_compensator, read_firmware_manifest, reproduced
 from tests.support.evidence import verify
 from tests.support.synthetic import needs_compiler, with_side
@@ -31,24 +29,6 @@ def mutate(folder, pattern: str, replacement, file: str = "dz_comp.c") -> None:
     changed, count = re.subn(pattern, replacement, text, count=1)
     assert count == 1 and changed != text, pattern
     source.write_text(changed)
-
-
-def test_the_generated_core_equals_the_law_on_every_input(firmware_folder):
-    result = check_all_inputs(firmware_folder)
-    assert result.holds
-    assert result.inputs == 4096 * (2 * 3326 + 1)
-    assert result.wrong == 0 and result.largest_error == 0
-
-
-def test_a_missing_limit_is_found_where_the_law_reaches_full_drive(example_compensator, tmp_path):
-    from dzdesign.codegen.project import generate
-
-    long_stroke = with_side(example_compensator, drive_range_over_u_max=Fraction(3, 4))
-    firmware = generate(long_stroke, "f28335")
-    write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
-    assert check_all_inputs(tmp_path / "fw").holds
-    mutate(tmp_path / "fw", r"at_most\(sum, side->quotient_limit\)", "sum")
-    assert not check_all_inputs(tmp_path / "fw").holds
 
 
 def test_an_offset_above_the_bound_is_over_compensation(example_compensator, tmp_path):
@@ -112,16 +92,6 @@ def test_a_core_that_does_not_compile_fails_the_verification(firmware_folder):
     mutate(firmware_folder, r"const uint64_t sum = \(\(whole\b", "const uint64_t sum = ((whale")
     result = verify(firmware_folder, sequence=QUICK)
     assert not result.holds and result.evidence.inputs == ()
-
-
-def test_reference_agrees_with_the_compensator_at_random(example_compensator):
-    exact = ExactLaw(example_compensator)
-    rng = np.random.default_rng(3)
-    codes = [int(code) for code in rng.integers(-3326, 3327, 40)]
-    for code in codes:
-        corners = exact.corners(exact.betas(code))
-        for command in (*range(0, 4095, 97), 4095):
-            assert exact.compare_value(command, corners) == example_compensator.compare(command, code)
 
 
 class TestPlant:

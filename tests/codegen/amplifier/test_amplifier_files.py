@@ -13,13 +13,11 @@ from dzdesign import api
 from dzdesign.codegen.amplifier.device import DEVICE_NAMES, device_named
 from dzdesign.codegen.amplifier.files import amplifier_file, is_file_of, notes_of
 from dzdesign.codegen.amplifier.setting import amplifier_setting
-from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
-from dzdesign.design.compensator import Compensator
 from dzdesign.design.fixed_offset import dead_zones
 from dzdesign.verify.outputs.amplifier import file_checks
 from dzdesign.verify.requirements import SAFE
-from tests.support.paths import GOLDENS, GOLDENS_FULL
+from tests.support.golden_firmware import FULL, GOLDENS, golden_compensator, golden_valve
 
 DIGEST = "0123456789abcdef" * 4
 #: The RMC100 takes no 5 V.
@@ -37,15 +35,12 @@ def unlimited(compensator):
 @pytest.fixture(scope="session")
 def designs():
     """The designs, by name."""
-    one, two = (
-        read_artefact((root / "compensator.json").read_bytes(), Compensator, "compensator.json")
-        for root in (GOLDENS, GOLDENS_FULL)
-    )
+    one, two = (golden_compensator(root=root) for root in (GOLDENS, FULL))
     return {
         "one solenoid": one,
         "two solenoids": unlimited(two),
         "two, limited": two,
-        "a budget": api.design(GOLDENS / "valve.json", bench_pressure_error="0 MPa", **BUDGET),
+        "a budget": api.design(golden_valve(), bench_pressure_error="0 MPa", **BUDGET),
     }
 
 

@@ -15,7 +15,6 @@ from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.verify.current.controller_states import check_states
 from dzdesign.verify.current.current_checks import read_controller
-from dzdesign.verify.exhaustive.drive_check import drive_follows
 from dzdesign.verify.toolchain.host_compiler import STRICT
 from tests.codegen.core.test_misra import findings
 from tests.support.block_cores import block_folder
@@ -94,13 +93,6 @@ def test_the_block_as_c_is_the_block_as_octets(tmp_path):
     subprocess.run(command, check=True)
     printed = subprocess.run([str(tmp_path / "main")], capture_output=True, check=True).stdout
     assert printed == firmware.block
-
-
-@pytest.mark.slow
-@needs_compiler
-def test_the_drive_follows_its_model_in_every_state(tmp_path):
-    compensator = variant("play")
-    assert drive_follows(block_folder(compensator, tmp_path / "fw"), compensator).holds
 
 
 @needs_compiler

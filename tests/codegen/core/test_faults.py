@@ -7,11 +7,10 @@ from itertools import pairwise
 
 import pytest
 
-from dzdesign.codegen.project import generate, target_named
+from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_files import write_folder
-from dzdesign.core.errors import InputError
 from dzdesign.design.designing import design
-from dzdesign.design.options import DesignOptions, options_of
+from dzdesign.design.options import DesignOptions
 from dzdesign.verify.exhaustive.drive_check import (
     CompiledDrive,
     PreparedDrive,
@@ -35,11 +34,6 @@ FULL, INVALID = 4095, 65535
 def compensator_of(samples: int = 5, latch: bool = False, interlock: bool = True):
     valve = golden_compensator("f28335", GOLDENS).valve
     return design(valve, DesignOptions(fault_samples=samples, fault_latch=latch, interlock=interlock))
-
-
-@cache
-def firmware_of(*options):
-    return Firmware(compensator_of(*options))
 
 
 def started(*options) -> Firmware:
@@ -244,33 +238,6 @@ def test_every_reachable_memory_is_tried(samples, latch):
     known = set(memories(compensator))
     assert {command for command, _ in seen} <= known and {pressure for _, pressure in seen} <= known
     assert {command[0] for command, _ in seen} == set(range(samples + 1))
-
-
-@pytest.mark.parametrize(
-    ("texts", "expected"),
-    [
-        ({}, (5, False, True)), ({"fault_debounce": "1 sample"}, (1, False, True)),
-        ({"fault_debounce": "4 ms", "fault_latch": "on"}, (5, True, True)),
-        ({"fault_debounce": "4.1 ms", "interlock": "off"}, (6, False, False)),
-        ({"fault_debounce": "8 s"}, (10_000, False, True)),
-    ],
-)  # fmt: skip
-def test_the_options_are_read(texts, expected):
-    options = options_of(texts, target_named("f28335").inputs())
-    assert (options.fault_samples, options.fault_latch, options.interlock) == expected
-
-
-@pytest.mark.parametrize(
-    "texts",
-    [
-        {"fault_debounce": "0 samples"}, {"fault_debounce": "5"}, {"fault_debounce": "9 s"},
-        {"fault_debounce": "-4 ms"}, {"fault_debounce": "2.5 samples"}, {"fault_latch": "yes"}, {"interlock": "1"},
-    ],
-    ids=lambda texts: " ".join(texts.values()),
-)  # fmt: skip
-def test_what_is_no_debounce_latch_or_interlock_is_refused(texts, wording):
-    with wording.refusal(InputError):
-        options_of(texts, target_named("f28335").inputs())
 
 
 def test_without_a_transition_the_declared_error_of_the_command_counts_as_zero():

@@ -9,8 +9,7 @@ from dzdesign.codegen.integers.form import RADIX, Form, Limbs, truncated
 from dzdesign.codegen.integers.law import block_form, function_form
 from dzdesign.core.errors import DzdesignError, InputError
 from tests.codegen.test_codegen import random_compensators
-from tests.support.octave import compensator_of
-from tests.support.paths import GOLDENS, GOLDENS_FULL
+from tests.support.golden_firmware import FULL, GOLDENS, golden_compensator
 from tests.support.printed_forms import printed_values
 
 #: Operation on x of -9 to 7 and y of 3 to 4, and what it means.
@@ -85,9 +84,9 @@ def test_of_sums_with_a_sign_a_quotient_is_rounded_towards_zero():
     assert [truncated(x, 4) for x in (-9, -8, -1, 0, 7)] == [-2, -2, 0, 0, 1]
 
 
-@pytest.mark.parametrize("root", [GOLDENS, GOLDENS_FULL])
+@pytest.mark.parametrize("root", [GOLDENS, FULL])
 def test_the_values_of_the_law_lie_within_their_ranges(root):
-    made, random = compensator_of(root), np.random.default_rng(7)
+    made, random = golden_compensator(root=root), np.random.default_rng(7)
     forms = [block_form(made, name) for name in ("plc", "codes")]
     forms += [function_form(made, sign) for sign in made.signals.signs]
     for form in forms:
@@ -103,7 +102,7 @@ def test_the_values_of_the_law_lie_within_their_ranges(root):
 
 def test_random_designs_give_the_exact_law_in_both_words():
     """Laws, tables, zero bands and transitions as they come: words of 64 bits, and limbs of 15."""
-    made, random = compensator_of(GOLDENS), np.random.default_rng(11)
+    made, random = golden_compensator(), np.random.default_rng(11)
     for compensator in random_compensators(made, 30, seed=5):
         u = np.array([0, 1, 4094, 4095, *random.integers(0, 4096, 12), *random.integers(0, 300, 12)])
         drop = np.array([-31, -30, 0, 63, 64, 3325, 3326, *random.integers(-40, 3327, 21)])

@@ -15,7 +15,7 @@ from dzdesign.design.firmware_manifest import OutputManifest
 from dzdesign.verify.outputs import amplifier
 from dzdesign.verify.outputs.verification import verify_output
 from dzdesign.verify.requirements import DEAD_ZONES, RAMPS, READ_BACK, REPRODUCED, SAFE
-from tests.support.paths import GOLDENS, GOLDENS_FULL
+from tests.support.golden_firmware import FULL, golden_compensator, golden_valve
 
 TABLE, FIRST = "dead_zones.csv", "positive,1.000000,opening,"
 #: Design, and the settings of a folder that has seeded faults.
@@ -25,8 +25,7 @@ BOTH = ("two", {"device": "west"})
 
 @pytest.fixture(scope="module")
 def designs():
-    two = read_artefact((GOLDENS_FULL / "compensator.json").read_bytes(), Compensator, "compensator.json")
-    return {"one": api.design(GOLDENS / "valve.json"), "two": two}
+    return {"one": api.design(golden_valve()), "two": golden_compensator(root=FULL)}
 
 
 @pytest.fixture

@@ -13,9 +13,8 @@ from dzdesign.verify.closed_loop.drive_corners import RELEASED, coil_and_supply
 from dzdesign.verify.closed_loop.loop import RampSequence
 from dzdesign.verify.closed_loop.loop_checks import opens_with_any_coil
 from dzdesign.verify.closed_loop.scene import scenes_of
-from tests.codegen.test_current_control import MEASURED, TEXTS
+from tests.support.designs import CURRENT, MEASURED, designed, replaced, written
 from tests.support.synthetic import needs_compiler
-from tests.support.written_firmware import designed, replaced, written
 
 pytestmark = needs_compiler
 #: A machine without errors of its own: the offset lies right below the band, so that nothing hides an overshoot.
@@ -37,7 +36,7 @@ def scenes_at_ends(valve, texts, folder, plant=None, edit=str):
 @pytest.fixture(scope="module", params=["stand-in", "plant of equations"])
 def controlled(request, example_valve, plant, tmp_path_factory):
     given = plant if request.param == "plant of equations" else None
-    return scenes_at_ends(example_valve, TEXTS, tmp_path_factory.mktemp("current") / "fw", given)
+    return scenes_at_ends(example_valve, CURRENT, tmp_path_factory.mktemp("current") / "fw", given)
 
 
 def test_at_rest_a_current_does_what_the_drive_did_on_the_bench(controlled):
@@ -79,7 +78,7 @@ def test_coil_and_supply_do_not_move_the_opening(controlled):
 )
 def test_a_controller_that_lets_the_current_go_is_seen(right, wrong, example_valve, tmp_path):
     """Without an integral the opening moves with the coil; with too low a reading the valve stays open at zero."""
-    faulty = scenes_at_ends(example_valve, TEXTS, tmp_path / "fw", edit=replaced((right, wrong)))
+    faulty = scenes_at_ends(example_valve, CURRENT, tmp_path / "fw", edit=replaced((right, wrong)))
     assert at_every_coil(faulty)[1].holds is False
 
 

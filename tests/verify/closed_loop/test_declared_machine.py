@@ -11,9 +11,8 @@ from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN, RampSequence
 from dzdesign.verify.closed_loop.scenarios import run_scenarios
 from dzdesign.verify.closed_loop.scene import scenes_of
 from dzdesign.verify.exhaustive.zero_command import bound_at, guarded_bounds
-from tests.codegen.test_current_control import TEXTS
+from tests.support.designs import CURRENT, designed, written
 from tests.support.synthetic import needs_compiler
-from tests.support.written_firmware import designed, written
 
 pytestmark = needs_compiler
 #: A coil on the bench at 20 °C and a supply of 24 V; and an amplifier, with nothing else than what a case is about.
@@ -97,7 +96,7 @@ def test_a_plant_of_equations_is_taken_to_its_bound_too(example_valve, plant, tm
 
 
 def test_a_current_that_the_firmware_controls_stays_shut_at_its_worst(example_valve, tmp_path):
-    compensator = designed(example_valve, "cortex-m4", **TEXTS)
+    compensator = designed(example_valve, "cortex-m4", **CURRENT)
     assert largest(scenes_of(written(compensator, tmp_path, "cortex-m4"), compensator, None)[:1]) <= NO_FLOW_L_MIN
 
 

@@ -2,20 +2,17 @@
 
 from dataclasses import replace
 from fractions import Fraction
-from functools import cache
 
 import numpy as np
 import pytest
 
-from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.design.designing import design
-from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.closed_loop.loop import RampSequence
 from dzdesign.verify.closed_loop.ramps import compare_at_pressure
 from dzdesign.verify.closed_loop.scene import scenes_of
-from tests.support.golden_firmware import FULL, full_options
+from tests.support.designs import written
+from tests.support.golden_firmware import FULL, full_options, golden_valve
 from tests.support.synthetic import needs_compiler
-from tests.support.written_firmware import written
 
 pytestmark = needs_compiler
 QUICK = RampSequence(rest=1.0, ramp=20.0, top=0.5)
@@ -23,14 +20,9 @@ NO_RAMPS = {"ramp_up_s": (0.0, 0.0), "ramp_down_s": (0.0, 0.0)}
 NO_DITHER = {"dither_Hz": 0.0, "dither_peak": Fraction(0)}
 
 
-@cache
-def valve():
-    return read_artefact((FULL / "valve.json").read_bytes(), ValveModel, "valve.json")
-
-
 def compared(folder, side: int = 1, change=lambda compensator: compensator, **options):
     """The scene and its comparison at 3 MPa, of a compensator with these options instead of everything."""
-    compensator = change(design(valve(), full_options(**options)))
+    compensator = change(design(golden_valve(FULL), full_options(**options)))
     scenes = scenes_of(written(compensator, folder), compensator, None, [1.0])
     (scene,) = [each for each in scenes if each.sign == side and abs(each.dp_MPa - 3) < 0.1]
     return scene, compare_at_pressure(scene, QUICK)

@@ -8,8 +8,8 @@ import pytest
 
 from dzdesign.verify.closed_loop.scenarios import converter_off_at_zero, run_scenarios
 from dzdesign.verify.closed_loop.scene import scenes_of
+from tests.support.designs import designed, replaced, written
 from tests.support.synthetic import needs_compiler
-from tests.support.written_firmware import designed, replaced, written
 
 pytestmark = [needs_compiler, pytest.mark.slow]
 #: Loops within loops: full, half, and small ones, back to zero at the end.

@@ -16,9 +16,9 @@ from dzdesign.verify.closed_loop.loop_checks import no_flow_at_zero, plant_is_th
 from dzdesign.verify.closed_loop.ramps import compare_at_pressure
 from dzdesign.verify.closed_loop.stand_in import StandIn, stand_in_of
 from dzdesign.verify.toolchain.compiled_library import CompiledLibrary
+from tests.support.designs import designed, written
 from tests.support.evidence import pressure_result, verify
 from tests.support.synthetic import SHARED, Truth, needs_compiler, synthetic_ramp
-from tests.support.written_firmware import designed, written
 
 pytestmark = needs_compiler
 QUICK = RampSequence(rest=0.5, ramp=10.0, top=0.5)

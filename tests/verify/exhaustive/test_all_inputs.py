@@ -1,7 +1,6 @@
 """The check of every input is checked: each count fires on a core that has just that fault, on every machine."""
 
 import re
-import shutil
 import subprocess
 from dataclasses import replace
 from fractions import Fraction
@@ -30,7 +29,7 @@ from dzdesign.verify.toolchain import machines
 from dzdesign.verify.toolchain.compiled_core import COUNTED, CompiledCore, Findings
 from dzdesign.verify.toolchain.host_compiler import host_compiler
 from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4
-from tests.support.golden_firmware import FULL, GOLDENS, INPUT, generated, write
+from tests.support.golden_firmware import FULL, golden_folder
 from tests.support.synthetic import needs_compiler
 
 pytestmark = needs_compiler
@@ -42,21 +41,15 @@ def needs(machine):
     return pytest.mark.skipif(bool(machine.missing()), reason=f"{machine.name}: {machine.missing()}")
 
 
-def copy_of(root, target: str, folder):
-    write(folder, generated(target, root))
-    shutil.copy(root / INPUT, folder / INPUT)
-    return folder
-
-
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory):
-    return copy_of(GOLDENS, "f28335", tmp_path_factory.mktemp("plain") / "fw")
+    return golden_folder("f28335", tmp_path_factory.mktemp("plain") / "fw")
 
 
 @pytest.fixture(scope="module")
 def full(tmp_path_factory):
     """Both signs, unlike sensors with live zeros, swapped pressures, an edge."""
-    return copy_of(FULL, "f28335", tmp_path_factory.mktemp("full") / "fw")
+    return golden_folder("f28335", tmp_path_factory.mktemp("full") / "fw", FULL)
 
 
 def exact_law(folder, sign: int = 1) -> ExactLaw:
@@ -264,7 +257,7 @@ def test_a_sample_has_the_corners(plain):
 @needs(CORTEX_M4)
 @pytest.mark.parametrize("sign", [1, -1])
 def test_the_machine_code_of_the_cortex_m4_gives_what_the_host_gives_at_every_input(sign, tmp_path):
-    folder = copy_of(FULL, "cortex-m4", tmp_path / "fw")
+    folder = golden_folder("cortex-m4", tmp_path / "fw", FULL)
     host = check_all_inputs(folder, sign)
     done = check_on_machine(folder, CORTEX_M4, host)
     assert done.holds and done.found.inputs == host.inputs and done.found.outputs_hash == host.outputs_hash
@@ -273,7 +266,7 @@ def test_the_machine_code_of_the_cortex_m4_gives_what_the_host_gives_at_every_in
 @pytest.mark.slow
 @needs(AVR)
 def test_the_machine_code_of_the_avr_gives_what_the_host_gives_at_the_sample(tmp_path):
-    folder = copy_of(GOLDENS, "host", tmp_path / "fw")
+    folder = golden_folder("host", tmp_path / "fw")
     done = check_on_machine(folder, AVR, check_all_inputs(folder))
     assert done.holds and done.found.inputs > 5000
 
@@ -282,7 +275,7 @@ def test_the_machine_code_of_the_avr_gives_what_the_host_gives_at_the_sample(tmp
 @needs(AVR)
 def test_an_int_of_16_bits_is_seen_on_the_avr_alone(tmp_path):
     """A product that needs a longer int, which no PC shows."""
-    folder = copy_of(GOLDENS, "host", tmp_path / "fw")
+    folder = golden_folder("host", tmp_path / "fw")
     core = folder / "core" / "dz_comp.c"
     text, count = re.subn(r"pressure_difference\(block, p_a_adc,",
                           "pressure_difference(block, (uint16_t)((p_a_adc * 17) / 17),", core.read_text())  # fmt: skip

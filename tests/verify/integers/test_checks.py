@@ -24,8 +24,8 @@ from dzdesign.verify.outputs.texts import (
     running,
 )
 from tests.support.core_variants import VARIANTS, variant
-from tests.support.octave import OCTAVE, compensator_of, needs_octave
-from tests.support.paths import GOLDENS, GOLDENS_FULL
+from tests.support.golden_firmware import FULL, golden_compensator
+from tests.support.octave import OCTAVE, needs_octave
 from tests.support.synthetic import needs_compiler
 
 SETTINGS = {"iec61131": {"dialect": "twincat", "interface": "codes"}, "matlab": {}}
@@ -35,7 +35,7 @@ DESIGNS = ("no transition", "live zero", "inverted", "bipolar, all options")
 
 @pytest.fixture(scope="module")
 def outputs():
-    made = compensator_of(GOLDENS)
+    made = golden_compensator()
     return {target: generate_output(made, target, settings) for target, settings in SETTINGS.items()}
 
 
@@ -161,7 +161,7 @@ def test_without_octave_the_function_is_not_checked(folder, monkeypatch):
 def octave_of(folder):
     def tried(old, new):
         edited(folder / "matlab" / "dz_comp.m", old, new)
-        checks = function_in_octave(folder / "matlab", 1, compensator_of(GOLDENS), available_octave()).checks
+        checks = function_in_octave(folder / "matlab", 1, golden_compensator(), available_octave()).checks
         return {check.id: check for check in checks}
 
     return tried
@@ -236,7 +236,7 @@ def test_the_command_writes_the_evidence(example_compensator, tmp_path, capsys):
 
 
 def test_a_block_of_two_solenoids_keeps_the_bounds_of_both(tmp_path):
-    made = compensator_of(GOLDENS_FULL)
+    made = golden_compensator(root=FULL)
     settings = {"dialect": "codesys", "interface": "plc"}
     write_generated(generate_output(made, "iec61131", settings), tmp_path / "iec61131")
     found = checks_of(tmp_path, "iec61131")

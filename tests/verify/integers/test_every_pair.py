@@ -13,12 +13,11 @@ from dzdesign.verify.outputs.every_pair import EveryPair
 from dzdesign.verify.outputs.exact_block import ExactBlock
 from dzdesign.verify.outputs.text_values import Overflow, TextValues
 from tests.support.core_variants import variant
-from tests.support.octave import compensator_of
-from tests.support.paths import GOLDENS, GOLDENS_FULL
+from tests.support.golden_firmware import FULL, GOLDENS, golden_compensator
 
 #: Pressure drops of a quick check, and of pressures at zero command every which; `verify` tries all.
 SOME, STEP = {"plc": range(-60, 2400, 211), "codes": range(-40, 3300, 97)}, 701
-ROOTS = {"one": GOLDENS, "two": GOLDENS_FULL}
+ROOTS = {"one": GOLDENS, "two": FULL}
 DESIGNS = ("no transition", "target law, no transition", "live zero", "inverted", "bipolar, no transition",
            "bipolar, all options")  # fmt: skip
 COUNTS = ("wrong", "wrong_status", "wrong_state")
@@ -43,7 +42,7 @@ def is_right(found):
 @pytest.fixture(scope="module", params=[(root, kind) for root in ROOTS for kind in SOME], ids=" ".join)
 def case(request):
     root, interface = request.param
-    made = compensator_of(ROOTS[root])
+    made = golden_compensator(root=ROOTS[root])
     return made, EveryPair(made, interface, made.signals.signs, remembers=True), interface
 
 
@@ -88,7 +87,7 @@ def test_rows_made_by_additions_are_the_exact_law(case):
 
 def test_in_units_of_a_plc_the_law_is_that_of_the_share_of_full_command():
     """By hand: full command at no pressure drop, beta of the next code outside, rounded down."""
-    made = compensator_of(GOLDENS)
+    made = golden_compensator()
     exact, side = ExactBlock(made, 1, "plc"), made.side(1)
     beta = made.law_beta(int(-(-Fraction(1, 100) // made.signals.pressure_a.per_code_MPa)))
     full = beta * side.u_min0_over_u_max + beta * (side.drive_range_over_u_max - 1) + 1  # Eq. (18) at full command
@@ -99,13 +98,13 @@ def test_in_units_of_a_plc_the_law_is_that_of_the_share_of_full_command():
 
 @pytest.fixture(scope="module")
 def one_plc():
-    made = compensator_of(GOLDENS)
+    made = golden_compensator()
     return structured_text(made, "0" * 64, "plc"), EveryPair(made, "plc", (1,), remembers=True)
 
 
 @pytest.fixture(scope="module")
 def two_plc():
-    made = compensator_of(GOLDENS_FULL)
+    made = golden_compensator(root=FULL)
     return structured_text(made, "0" * 64, "plc"), EveryPair(made, "plc", (1, -1), remembers=True)
 
 
