@@ -1,7 +1,6 @@
 """The checkers are checked: faults seeded in the C, in the law and in the design must be seen."""
 
 import json
-import re
 
 import numpy as np
 import pytest
@@ -14,21 +13,13 @@ from dzdesign.verify.closed_loop.ramps import dead_zone
 from dzdesign.verify.closed_loop.scene import scenes_of
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
 from dzdesign.verify.folder import Regenerated, read_compensator, read_firmware_manifest, reproduced
+from tests.support.attacked_firmware import add, edit
 from tests.support.evidence import verify
 from tests.support.synthetic import needs_compiler, with_side
 
 pytestmark = needs_compiler
 
 QUICK = RampSequence(rest=0.5, ramp=4.0, top=0.5)
-
-
-def mutate(folder, pattern: str, replacement, file: str = "dz_comp.c") -> None:
-    """Change one place of the generated core."""
-    source = folder / "core" / file
-    text = source.read_text()
-    changed, count = re.subn(pattern, replacement, text, count=1)
-    assert count == 1 and changed != text, pattern
-    source.write_text(changed)
 
 
 def test_an_offset_above_the_bound_is_over_compensation(example_compensator, tmp_path):
@@ -52,32 +43,25 @@ def fault_of(folder, manifest):
 
 @pytest.mark.parametrize(
     "name",
-    ["core/my.c", "f28335/extra.c", "more/extra.CPP", "f28335/x.asm", "F28335.cmd", "f28335/my.projectspec", "my.mk"],
-)
-def test_source_and_project_files_that_were_added_are_refused(firmware_folder, name, wording):
+    ["core/my.c", "core/board/adc.c", "f28335/extra.c", "more/extra.CPP", "f28335/x.asm", "F28335.cmd",
+     "f28335/my.projectspec", "my.mk"],
+)  # fmt: skip
+def test_source_and_project_files_that_were_added_are_refused(firmware_folder, name):
     manifest = read_firmware_manifest(firmware_folder)
     for built in ("f28335/main.o", "f28335/firmware.out", "f28335/firmware.map"):
         (firmware_folder / built).write_text("")
     assert fault_of(firmware_folder, manifest) == ""
-    (firmware_folder / name).parent.mkdir(exist_ok=True)
-    (firmware_folder / name).write_text("")
-    wording.of_test(fault_of(firmware_folder, manifest))
+    add(firmware_folder, name)
+    assert fault_of(firmware_folder, manifest).startswith(f"not generated: {name}; keep your own")
 
 
 def test_what_cmake_built_may_stay_where_nothing_of_ours_is(firmware_folder, wording):
     manifest = read_firmware_manifest(firmware_folder)
     for name in ("build/CMakeCache.txt", "build/Makefile", "build/CMakeFiles/3.30/CMakeCCompilerId.c"):
-        (firmware_folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (firmware_folder / name).write_text("")
+        add(firmware_folder, name)
     assert fault_of(firmware_folder, manifest) == ""
     for name in ("f28335/CMakeCache.txt", "f28335/extra.c", "CMakeCache.txt"):
         (firmware_folder / name).write_text("")
-    wording.of_test(fault_of(firmware_folder, manifest))
-
-
-def test_a_header_that_may_be_taken_for_ours_is_said(firmware_folder, wording):
-    manifest = read_firmware_manifest(firmware_folder)
-    (firmware_folder / "f28335" / "dz_comp.h").write_text("#define DZ_COMPARE_MAX 1u\n")  # goes before core's
     wording.of_test(fault_of(firmware_folder, manifest))
 
 
@@ -89,7 +73,7 @@ def test_a_manifest_that_names_no_file_is_no_evidence(firmware_folder, wording):
 
 
 def test_a_core_that_does_not_compile_fails_the_verification(firmware_folder):
-    mutate(firmware_folder, r"const uint64_t sum = \(\(whole\b", "const uint64_t sum = ((whale")
+    edit(firmware_folder, "core/dz_comp.c", "const uint64_t sum = ((whole", "const uint64_t sum = ((whale")
     result = verify(firmware_folder, sequence=QUICK)
     assert not result.holds and result.evidence.inputs == ()
 
