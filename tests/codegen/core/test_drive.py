@@ -71,8 +71,8 @@ def turned(text: str):
 FOLLOWS_AT_ONCE = {"fault_samples": 1, "fault_latch": False, "interlock": False}
 
 
-def options_named(name: str) -> DesignOptions:
-    """Sets of options, each with something that the others lack."""
+def option_sets() -> dict[str, DesignOptions]:
+    """Return sets of options, each with something that the others lack."""
     watched = full_options()
     full = replace(watched, **FOLLOWS_AT_ONCE)
     plain = DesignOptions(
@@ -107,21 +107,15 @@ def options_named(name: str) -> DesignOptions:
         "one solenoid, interlock": replace(plain, fault_samples=5, interlock=True),
         "one solenoid, no transition, latch": replace(plain, transition=Fraction(0), fault_samples=4, fault_latch=True),
         "everything, watched": watched,
-    }[name]
+    }
 
 
-SETS = (
-    "everything", "two solenoids alone", "turned, same pressures", "one solenoid alone", "one solenoid, ramps",
-    "one solenoid, turned, live zero, dither", "quick ramps, small error",
-    "two solenoids, play",
-    "two solenoids, no transition", "two solenoids, interlock and latch", "one solenoid, interlock",
-    "one solenoid, no transition, latch", "everything, watched",
-)  # fmt: skip
+SETS = option_sets()
 
 
 @cache
 def compensator_named(name: str) -> Compensator:
-    return design(golden_valve(FULL), options_named(name))
+    return design(golden_valve(FULL), SETS[name])
 
 
 def first_difference(firmware, model: DriveModel, samples: list[tuple[int, int, int]]) -> str:
@@ -266,7 +260,7 @@ def test_the_dither_has_its_frequency_and_its_peak(name):
     law = firmware.state.law
     assert set(seen) == {law + functions.dither_counts, law - functions.dither_counts}
     rises = sum(later > earlier for earlier, later in pairwise(seen))
-    asked = options_named(name)
+    asked = SETS[name]
     exact = signals.tick_Hz / (2 * functions.dither_ticks)
     assert abs(rises - exact) <= 1
     assert abs(1 / exact - 1 / asked.dither_Hz) <= 1 / signals.tick_Hz, "to a PWM period"

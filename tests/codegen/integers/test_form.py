@@ -10,7 +10,7 @@ from dzdesign.codegen.integers.law import block_form
 from dzdesign.codegen.integers.text import st_body, st_constants
 from dzdesign.core.errors import DzdesignError, InputError
 from dzdesign.verify.outputs.text_values import TextValues
-from tests.codegen.test_codegen import random_compensators
+from tests.codegen.core.test_core_against_law import random_compensators
 from tests.support.golden_firmware import FULL, GOLDENS, golden_compensator
 
 #: Operation on x of -9 to 7 and y of 3 to 4, and what it means.

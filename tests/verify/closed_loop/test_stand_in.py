@@ -360,12 +360,6 @@ def test_a_side_without_pressure_drops_has_no_stand_in(wording):
         stand_in_of(identify([ramp]).positive, 10.0)
 
 
-def test_recordings_at_several_pressures_have_load_steps(scenes, example_compensator):
-    dp = [test.dp_MPa for test in example_compensator.valve.positive.tests]
-    assert [scene.dp_MPa for scene in scenes] == dp
-    assert all(scene.tested_MPa == (dp[0], dp[-1]) for scene in scenes)
-
-
 @pytest.mark.slow
 @needs_shared
 @pytest.mark.parametrize("name", ["valve_a", "valve_e"])

@@ -14,8 +14,6 @@ from dzdesign.verify.exhaustive.drive_check import FIELDS, CompiledDrive, Prepar
 from tests.support.core_mutants import (
     KILLED,
     REFUSED,
-    SAME_OBJECT,
-    SAME_OUTPUTS,
     SURVIVED,
     Mutant,
     MutationBench,
@@ -59,27 +57,6 @@ def test_the_original_passes_and_a_wrong_one_is_no_bench(plain, tmp_path, wordin
     with wording.refusal(RequirementError):
         MutationBench(tmp_path / "fw").check_original()
     assert bench.judge(edited(bench, "dz_comp.c", "DZ_BETA_STEP - past", "63u - past")).verdict == KILLED
-
-
-#: By hand, one a verdict.
-JUDGED = [
-    ("dz_valve.h", ".reverse = UINT32_C(122880)", ".reverse = UINT32_C(126976)", KILLED),
-    ("dz_comp.c", "return (uint16_t)(counts_of(", "return (uint16_t)((counts_of(", REFUSED),
-    ("dz_comp.c", "/* ---- the law ---- */", "/* the law */", SAME_OBJECT),
-    ("dz_calibration.h", "DZ_ADC_CODE_MAX 4095u", "DZ_ADC_CODE_MAX 4096u", SAME_OBJECT),
-    ("dz_valve.h", ".half = {UINT32_C(0)", ".half = {UINT32_C(1)", SAME_OUTPUTS),
-    ("dz_drive.c", "drive->status = 0u;", "drive->status = 1u;", KILLED),
-    ("dz_drive.c", "dz_comp_checked(past, p_a_adc", "dz_comp_checked(past, p_b_adc", KILLED),
-]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("file", "old", "new", "verdict"), JUDGED, ids=[f"{each[3]} {i}" for i, each in enumerate(JUDGED)]
-)
-def test_a_verdict_is_given_where_it_is_due(plain, file, old, new, verdict):
-    outcome = plain.judge(edited(plain, file, old, new))
-    assert outcome.verdict == verdict, outcome
 
 
 @pytest.mark.slow
