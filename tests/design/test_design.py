@@ -10,13 +10,10 @@ import pytest
 from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.artefact_types import RuleError
-from dzdesign.core.errors import InputError, RequirementError
-from dzdesign.design.ceiling import offset_ceiling
-from dzdesign.design.certificate import guarded_curve
+from dzdesign.core.errors import InputError
 from dzdesign.design.costs_at_tests import read_dead_zone
 from dzdesign.design.designing import design
 from dzdesign.design.drive_functions import DriveFunctions
-from dzdesign.design.machine import allowance_of
 from dzdesign.design.signals import CommandSignal, Signals
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.regeneration import regenerated
@@ -109,10 +106,6 @@ def test_a_valve_file_that_contradicts_itself_is_refused(example_valve, wording)
     higher = {"u_min0_V": side.curve.u_min0_V + 0.02, "offset_V": tuple(u + 0.02 for u in side.curve.offset_V)}
     with wording.refusal(RuleError, "design: a valve that contradicts itself"):
         with_curve(side, **higher)
-    greedy = dataclasses.replace(guarded_curve(side, "closing", "hold"), offset_V=(Fraction(6), Fraction(6)))
-    greedy = dataclasses.replace(greedy, dp_MPa=(greedy.dp_MPa[0], greedy.dp_MPa[-1]))
-    with pytest.raises(RequirementError):
-        offset_ceiling(greedy, Fraction(10), allowance_of(Signals()))
 
 
 def test_a_law_that_would_fall_with_command_is_refused():
