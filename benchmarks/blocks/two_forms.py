@@ -24,8 +24,8 @@ from dzdesign.identify.identification import identify
 from dzdesign.identify.reading.ramp_files import read_ramp_file
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.toolchain.machines import Machine
-from tests.codegen.test_current_control import MEASURED
 from tests.support.core_texts import texts
+from tests.support.designs import MEASURED
 from tests.support.golden_firmware import FULL, full_options
 
 SHARED = Path(os.environ.get("DZDESIGN_SHARED_DATA", Path(__file__).parents[3] / "shared" / "data"))

@@ -18,7 +18,7 @@ from dzdesign.verify.closed_loop.against_cvodes import MOST_APART, Window, compa
 from dzdesign.verify.closed_loop.loop import RECORD_S, ClosedLoop
 from dzdesign.verify.closed_loop.plant import Plant
 from dzdesign.verify.closed_loop.scene import Scene, scenes_of
-from tests.support.written_firmware import designed, written
+from tests.support.designs import designed, written
 
 QUICK_S, WHOLE_S = 0.3, 1.0
 #: Times real time at least, and how often it is measured: the others held something else too.

@@ -1,6 +1,5 @@
 """The files of a firmware that are its user's to fill in: kept by `codegen`, named and not checked by `verify`."""
 
-import json
 import re
 import shutil
 import subprocess
@@ -11,20 +10,18 @@ from dzdesign import api
 from dzdesign.codegen.project import generate, targets
 from dzdesign.codegen.writing import write_generated
 from dzdesign.command_line.cli import main
-from dzdesign.core.artefact_files import MANIFEST_NAME, write_folder
+from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.artefact_types import to_json_bytes
-from dzdesign.core.documents import to_json
 from dzdesign.core.errors import InputError
 from dzdesign.design.designing import design
 from dzdesign.regeneration import regenerated
-from dzdesign.report.valve_report import REPORT_NAME, report_of_folder, with_report
 from dzdesign.verify import compilation
-from dzdesign.verify.closed_loop.loop import RampSequence
 from dzdesign.verify.compilation import BoardCompiled, board_compiles
 from dzdesign.verify.folder import changed_board_files, read_firmware_manifest, reproduced, user_files
-from dzdesign.verify.verification import evidence_manifest, not_tried
+from dzdesign.verify.verification import not_tried
 from tests.conftest import default_options
-from tests.support.evidence import evidence_with, verify
+from tests.support.attacked_firmware import add
+from tests.support.evidence import evidence_with
 from tests.support.synthetic import needs_compiler
 
 pytestmark = needs_compiler
@@ -118,16 +115,6 @@ def test_it_is_said_where_another_text_would_be_generated_now(compensator, corte
     assert kept == {"cortex_m4/dz_board.c": True}
 
 
-@pytest.mark.parametrize("name", ["cortex_m4/dz_tick.c", "core/dz_drive.c", "cortex_m4/Makefile", "compensator.json"])
-def test_any_other_file_that_was_changed_is_not_overwritten(compensator, cortex, name, wording):
-    text = (cortex / name).read_text()
-    (cortex / name).write_text(text.replace("1.0.0", "1.0.1", 1) + "\n")
-    before = {path: path.read_bytes() for path in cortex.rglob("*") if path.is_file()}
-    with wording.refusal(InputError):
-        write_generated(generate(compensator, "cortex-m4"), cortex)
-    assert before == {path: path.read_bytes() for path in cortex.rglob("*") if path.is_file()}
-
-
 def test_what_was_filled_in_is_not_lost_to_another_target(compensator, cortex, wording):
     fill_in(cortex)
     with wording.refusal(InputError):
@@ -168,21 +155,6 @@ def test_a_link_in_its_place_stays_a_link(compensator, cortex, tmp_path):
 # ---- verified ----
 
 
-@pytest.mark.parametrize("name", ["cortex_m4/dz_tick.c", "cortex_m4/dz_board.h", "core/dz_comp.c", "compensator.json"])
-def test_an_edited_file_that_is_not_the_users_still_fails(cortex, name, wording):
-    fill_in(cortex)
-    (cortex / name).write_text((cortex / name).read_text() + "\n")
-    assert unchanged(cortex).holds is False
-    wording.of_test(unchanged(cortex).text)
-
-
-def test_a_manifest_whose_board_is_no_list_is_bad_input(cortex, wording):
-    manifest = json.loads((cortex / MANIFEST_NAME).read_text())
-    (cortex / MANIFEST_NAME).write_text(to_json({**manifest, "board": 3}))
-    with wording.refusal(InputError):
-        read_firmware_manifest(cortex)
-
-
 @needs_arm
 @pytest.mark.parametrize(
     ("new", "holds"), [("return 7u;", True), ("return seven;", False), ("return 7u;\n}\n#include <my_chip.h>\n{", None)]
@@ -205,35 +177,23 @@ def test_without_the_compiler_it_is_said_why(cortex, monkeypatch):
     assert found == BoardCompiled(not_compiled="no-such-gcc is not on the path; install it, then `verify`")
 
 
-@pytest.mark.slow
 @needs_arm
-@pytest.mark.usefixtures("each_core_once")
-def test_a_vendors_header_is_named_and_found_by_an_option(cortex, tmp_path, capsys, wording):
+def test_a_vendors_header_is_named_and_found_by_an_option(cortex, tmp_path, wording):
     fill_in(cortex, old="#include", new='#include "stm32_chip.h"\n#include')
-    evidence = tmp_path / "evidence"
-    assert main(["verify", str(cortex), "-o", str(evidence)]) == 0
-    said = " ".join(capsys.readouterr().out.split())
-    why = "stm32_chip.h, which cortex_m4/dz_board.c includes, was not found in the firmware; verify --include DIR"
-    assert f"NOT RUN (optional) your board files compile: {why}" in said
-    assert "stm32_chip.h, which" in (evidence / REPORT_NAME).read_text(encoding="utf-8")
-    headers = [tmp_path / "device", tmp_path / "cmsis"]
-    for folder, text in zip(headers, ['#include "core_cm4.h"\n', "int narrow(long x);\n"], strict=True):
-        folder.mkdir()
-        (folder / ("stm32_chip.h" if "core" in text else "core_cm4.h")).write_text(text)
     manifest = read_firmware_manifest(cortex)
+    missing = "stm32_chip.h, which cortex_m4/dz_board.c includes, was not found in the firmware; `verify --include DIR`"
+    assert missing in board_compiles(cortex, manifest).not_compiled
+    headers = [tmp_path / "device", tmp_path / "cmsis"]
+    add(headers[0], "stm32_chip.h", '#include "core_cm4.h"\n')
+    add(headers[1], "core_cm4.h", "int narrow(long x);\n")
     found = board_compiles(cortex, manifest, headers[:1])
     missing = "core_cm4.h, which cortex_m4/dz_board.c includes, was not found in the firmware nor in"
     assert found.checks == () and f"{missing} {headers[0]}" in found.not_compiled
-    includes = [word for header in headers for word in ("--include", str(header))]
-    assert main(["verify", str(cortex), "-o", str(evidence), *includes]) == 0
-    said = " ".join(capsys.readouterr().out.split())
-    assert "HOLDS your board files compile: each file compiles, with your changes in cortex_m4/dz_board.c" in said
-    (cortex / "board").mkdir()
-    (cortex / "board/adc.c").write_text("int adc(void);\nint adc(void) { return 1; }\n")
+    add(cortex, "board/adc.c", "int adc(void);\nint adc(void) { return 1; }\n")
     (check,) = board_compiles(cortex, manifest, headers).checks
     assert check.holds
     wording.of_test(check.text)
-    (cortex / "board/adc.c").write_text("#error broken\n")
+    add(cortex, "board/adc.c", "#error broken\n")
     (check,) = board_compiles(cortex, manifest, headers).checks
     assert check.holds is False
     wording.of_test(check.text)
@@ -251,9 +211,8 @@ def test_include_of_what_is_no_folder_or_not_compiled_here_is_refused(compensato
 
 
 def test_files_in_the_folder_for_them_are_named_kept_and_not_checked(compensator, cortex, wording):
-    (cortex / "board").mkdir()
-    (cortex / "board/adc.c").write_text("this is no C")
-    (cortex / "board/my_chip.ld").write_text("/* mine */")
+    add(cortex, "board/adc.c", "this is no C")
+    add(cortex, "board/my_chip.ld", "/* mine */")
     check = unchanged(cortex)
     assert check.holds
     wording.of_test(check.text)
@@ -261,24 +220,9 @@ def test_files_in_the_folder_for_them_are_named_kept_and_not_checked(compensator
     assert sorted(found) == ["board/adc.c", "board/my_chip.ld"]
     write_generated(generate(compensator, "cortex-m4"), cortex)
     assert (cortex / "board/adc.c").read_text() == "this is no C"
-    evidence = evidence_with(user_files=("board/adc.c",))
-    assert "board/adc.c, which is yours: review it, and try it on the machine" in not_tried(evidence)
-
-
-@pytest.mark.parametrize(
-    "name",
-    [
-        "board/dz_comp.h",
-        "cortex_m4/my.ld",
-        "core/board/adc.c",
-        "core/adc.c",
-    ],
-)
-def test_elsewhere_or_by_a_name_of_ours_they_fail(cortex, name, wording):
-    (cortex / name).parent.mkdir(exist_ok=True)
-    (cortex / name).write_text("int x;\n")
-    assert unchanged(cortex).holds is False
-    wording.of_test(unchanged(cortex).text)
+    said = not_tried(evidence_with(user_files=("board/adc.c",), changed_board_files=("cortex_m4/dz_board.c",)))
+    assert "board/adc.c, which is yours: review it, and try it on the machine" in said
+    assert "cortex_m4/dz_board.c, which is yours and was changed: review it, and try it on the machine" in said
 
 
 @pytest.mark.slow
@@ -301,30 +245,3 @@ def test_make_takes_renamed_copies_of_board_files_and_finds_what_lies_in_board(c
     )
     assert named.returncode == 0, named.stderr
     assert unchanged(cortex).holds
-
-
-@pytest.mark.slow
-def test_verify_holds_and_says_that_it_was_not_checked(cortex, tmp_path):
-    fill_in(cortex)
-    result = verify(cortex, again=regenerated(cortex), sequence=RampSequence(rest=0.5, ramp=4.0, top=0.5))
-    assert result.holds and result.evidence.changed_board_files == ("cortex_m4/dz_board.c",)
-    said = "cortex_m4/dz_board.c, which is yours and was changed: review it, and try it on the machine"
-    assert said in not_tried(result.evidence)
-    assert "NOT RUN (optional)  cortex_m4/dz_board.c, which is yours" in str(result)
-    manifest = evidence_manifest(result.evidence)
-    write_folder(tmp_path / "evidence", with_report(result, cortex, tmp_path / "evidence"), manifest)
-    html = (tmp_path / "evidence" / REPORT_NAME).read_text(encoding="utf-8")
-    assert 'class="verdict good"' in html and "which is yours and was changed" in html
-    assert report_of_folder(tmp_path / "evidence").kind == "good"
-    fill_in(cortex, "cortex_m4/startup.c", "#include <stdint.h>", "#include <stdint.h> ")  # after the evidence
-    with pytest.raises(InputError, match=r"startup\.c' was changed since"):
-        report_of_folder(tmp_path / "evidence")
-
-
-def test_a_project_file_of_code_composer_studio_is_the_users(compensator, tmp_path, wording):
-    write_generated(generate(compensator, "f28335"), tmp_path)
-    fill_in(tmp_path, PROJECT, "C:/ti/c2000", "D:/ti/c2000")
-    check = unchanged(tmp_path)
-    assert check.holds
-    wording.of_test(check.text)
-    assert changed_board_files(tmp_path, read_firmware_manifest(tmp_path)) == (PROJECT,)

@@ -12,13 +12,11 @@ import sys
 import pytest
 
 from dzdesign.codegen.target import folder_of
-from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
 from dzdesign.verify.toolchain.host_compiler import STRICT
 from tests.support.drive_model import walked_line
 from tests.support.golden_firmware import (
     FULL,
     GOLDENS,
-    INPUT,
     KEPT,
     differences,
     generated,
@@ -38,7 +36,6 @@ def needs(*tools: str, package: str = ""):
     return pytest.mark.skipif(bool(missing), reason=f"no {', '.join(missing)} on the path; apt install {package}")
 
 
-needs_avr = needs("avr-gcc", "simavr", "make", package="gcc-avr avr-libc simavr make")
 needs_arm = needs(
     "arm-none-eabi-gcc",
     "qemu-system-arm",
@@ -118,18 +115,6 @@ def test_a_file_that_targets_share_stands_once_and_none_is_of_a_target_that_is_g
     assert len(core) == 6 and core.items() <= generated("f28335", FULL).items()
 
 
-def test_a_difference_is_shown_by_file_and_line(tmp_path):
-    files = golden_files("host", GOLDENS)
-    folder = write(tmp_path / "host", files)
-    header = folder / "core" / "dz_calibration.h"
-    header.write_text(header.read_text().replace("DZ_COMPARE_MAX 60000u", "DZ_COMPARE_MAX 60001u"))
-    (folder / "host" / "README.md").unlink()
-    (folder / "host" / "notes.txt").touch()
-    shown = differences(folder, files)
-    assert "--- golden host/core/dz_calibration.h" in shown and "+#define DZ_COMPARE_MAX 60000u" in shown
-    assert "host/host/README.md: no golden" in shown and "host/host/notes.txt: a golden that is not generated" in shown
-
-
 @pytest.mark.parametrize("compiler", CROSS_COMPILERS)
 @pytest.mark.parametrize(("root", "target"), [(GOLDENS, "host"), (FULL, "cortex-m4")])
 def test_core_and_self_test_compile_strictly(root, target, compiler, copy):
@@ -207,15 +192,6 @@ def test_everything_switched_on_in_qemu_prints_the_hash_of_the_model(copy):
     printed = run("make", f"CFLAGS={WARNINGS}", "check", cwd=folder)
     assert walked_line(golden_compensator("cortex-m4", FULL)) in lines_of_selftest(printed)
     assert "dz_tick: 31 interrupts, compare values of dz_drive_tick()" in printed
-
-
-@pytest.mark.parametrize("sign", [1, -1])
-@pytest.mark.slow
-def test_everything_switched_on_is_exact_on_all_inputs(sign, copy):
-    folder = copy("f28335", FULL)
-    shutil.copy(FULL / INPUT, folder / INPUT)
-    result = check_all_inputs(folder, sign)
-    assert result.holds and result.wrong == 0 and result.over_compensated == 0
 
 
 @needs_arm

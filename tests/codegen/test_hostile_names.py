@@ -161,14 +161,6 @@ def test_a_name_in_a_plot(name):
     assert not any(key.startswith("on") for element in root.iter() for key in element.attrib)
 
 
-def test_a_name_in_the_derivation(capsys, tmp_path, monkeypatch):
-    name = "<script>alert(1)</script>{{ 7 * 7 }}\x1b[2J"
-    monkeypatch.chdir(tmp_path)
-    assert main(["derive", "--format", "html", "--equation", name, "-o", "page.html"]) == 2
-    line = capsys.readouterr().err
-    assert line.count("\n") == 1 and line.rstrip("\n").isprintable() and not Path("page.html").exists()
-
-
 # the terminal
 
 
@@ -194,7 +186,8 @@ def test_names_in_tables_steer_no_terminal_and_are_no_markup(example_valve, caps
 @pytest.mark.parametrize("name", [name for name in NAMES if name.strip() and "\ud800" not in name and len(name) < 250])
 def test_a_name_in_an_error(tmp_path, monkeypatch, capsys, name):
     monkeypatch.chdir(tmp_path)
-    for words in (["identify", name], ["design", name], ["verify", name], ["codegen", name, "--target", name]):
+    for words in (["identify", name], ["design", name], ["verify", name], ["codegen", name, "--target", name],
+                  ["derive", "--equation", name]):  # fmt: skip
         assert main(words) == 2
         line = capsys.readouterr().err
         assert line.count("\n") == 1 and line.rstrip("\n").isprintable()
@@ -242,7 +235,7 @@ def test_a_manifest_that_names_what_lies_outside(place, name, key, wording):
     folder = place / "firmware"
     digest = sha256_of(b"years of work")
     manifest_with(folder, lambda it: it["files"].update({name: digest}) if key == "files" else it["core"].append(name))
-    with wording.refusal(InputError):
+    with pytest.raises(InputError, match=r"which is not a file inside the folder|expected text that is not empty"):
         read_firmware_manifest(folder)
     if key == "files":
         with wording.refusal(InputError, "hostile names: a folder whose manifest is none"):
@@ -281,20 +274,6 @@ def test_a_firmware_has_no_link_even_to_a_place_inside(place, wording, target):
     with pytest.raises(InputError) as refused:
         read_firmware_manifest(folder)
     wording("hostile names: a link in a firmware", str(refused.value).replace(str(place), "FOLDER"))
-
-
-@pytest.mark.skipif(os.name == "nt", reason="links need a privilege on Windows")
-def test_verify_and_simulate_refuse_it_on_the_command_line(firmware_folder, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    secret = tmp_path / "secret.c"
-    secret.write_text("#error the secret\n")
-    core = firmware_folder / "core" / "dz_comp.c"
-    core.unlink()
-    core.symlink_to(secret)
-    for words in (["verify"], ["simulate", "--firmware"]):
-        assert main([*words, str(firmware_folder)]) == 2
-        line = capsys.readouterr().err
-        assert "outside of" in line and "the secret" not in line
 
 
 @pytest.mark.skipif(os.name == "nt", reason="links need a privilege on Windows")

@@ -1,4 +1,8 @@
-"""What every target folder must be: found by itself, packaged, chosen on the command line, safe from users' names."""
+"""What every target folder must be: found by itself, packaged, chosen, safe from users' names; its flash; a new one.
+
+Oracle of the sectors: C2000Ware 26.01.00.00, device_support/f2833x/common/cmd/F28335.cmd and
+device_support/f28004x/common/cmd/28004x_generic_flash_lnk.cmd; `make bench-c2000ware` reads a user's own copy of them.
+"""
 
 import json
 import os
@@ -7,7 +11,7 @@ import shutil
 import subprocess
 import sys
 import zipfile
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import PurePosixPath
 
 import pytest
@@ -16,14 +20,16 @@ from hypothesis import strategies as st
 
 from dzdesign.codegen import project
 from dzdesign.codegen.banner import LONGEST, printable_list, printable_name
+from dzdesign.codegen.calibration.layout import LENGTH_WORDS
+from dzdesign.codegen.calibration.packing import Place
 from dzdesign.codegen.cortex_m4 import target as cortex_m4
 from dzdesign.codegen.other_targets import ALL_TARGET_NAMES, OTHER_TARGETS
-from dzdesign.codegen.project import TARGET_NAMES, generate, target_named
+from dzdesign.codegen.project import TARGET_NAMES, generate, target_named, targets
 from dzdesign.codegen.target import folder_of
 from dzdesign.command_line.cli import main
-from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.errors import DzdesignError, InputError
-from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
+from dzdesign.verify.toolchain.host_compiler import STRICT, host_compiler
+from tests.support.documented_commands import try_page
 from tests.support.golden_firmware import GOLDENS, golden_compensator
 from tests.support.paths import ROOT
 from tests.support.synthetic import needs_compiler
@@ -143,16 +149,6 @@ def test_a_compensator_of_another_target_is_refused_with_the_way_out(wording):
         assert "DZ_COMPARE_MAX 40000u" in generate(golden_compensator("f280049c"), name).files["core/dz_calibration.h"]
 
 
-@pytest.mark.slow
-@needs_compiler
-def test_the_core_is_exact_on_every_input_for_another_pwm(tmp_path):
-    firmware = generate(golden_compensator("f280049c"), "f280049c")
-    write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
-    result = check_all_inputs(tmp_path / "fw")
-    # Every command at each difference of two sound pressures, 688 to 4014.
-    assert result.holds and result.wrong == 0 and result.inputs == 4096 * (2 * (4014 - 688) + 1)
-
-
 @pytest.mark.parametrize("name", ["cortex_m4", "Cortex-M4", "-m4"])
 def test_a_target_with_a_wrong_name_is_refused(name):
     with pytest.raises(DzdesignError):
@@ -193,3 +189,101 @@ def test_a_printable_name_acts_nowhere(name):
 def test_an_honest_name_stays_and_many_are_counted():
     assert printable_name("ramp_1.0-MPa.csv") == "ramp_1.0-MPa.csv"
     assert printable_list(["a", "b", "c", "d", "e", "f"]) == "a, b, c, d and 2 more"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stated:
+    """What TI's linker file says of the range, and the flash ranges that it places sections in."""
+
+    file: str
+    region: str
+    page: int
+    origin: int
+    length: int
+    used: frozenset[str]
+
+
+STATED = {
+    "f28335": Stated(
+        file="F28335.cmd", region="FLASHB", page=1, origin=0x330000, length=0x8000,
+        used=frozenset({"FLASHA", "FLASHC", "FLASHD", "BEGIN", "CSM_PWL", "CSM_RSVD"}),
+    ),
+    "f280049c": Stated(
+        file="28004x_generic_flash_lnk.cmd", region="FLASH_BANK1_SEC8", page=0, origin=0x098000, length=0x1000,
+        used=frozenset({"BEGIN", *(f"FLASH_BANK0_SEC{number}" for number in (1, 2, 3, 4, 5))}),
+    ),
+}  # fmt: skip
+
+
+def test_every_sector_is_stated_and_no_other():
+    assert {target.name for target in targets() if target.sector} == STATED.keys()
+    assert target_named("host").block_place == Place()
+
+
+@pytest.mark.parametrize("name", STATED)
+def test_the_sector_is_that_of_the_linker_file(name):
+    stated, target = STATED[name], target_named(name)
+    sector = target.sector
+    assert (sector.file, sector.region, sector.page) == (stated.file, stated.region, stated.page)
+    assert (sector.address, sector.words) == (stated.origin, stated.length)
+    assert target.block_place == Place(address=stated.origin, unit_octets=2)
+    assert sector.words >= LENGTH_WORDS
+
+
+@pytest.mark.parametrize("name", STATED)
+def test_a_block_alone_is_linked_into_the_sector(name):
+    stated = STATED[name]
+    assert stated.region not in stated.used, "TI's file places nothing there"
+    files = generate(golden_compensator(name), name, calibration="block").files
+    fragment = re.sub(r"/\*.*?\*/", "", files[f"{name}/dz_calibration.cmd"], flags=re.DOTALL)
+    placed = re.findall(r"(\S+)\s*:\s*>+\s*(\w+),\s*PAGE\s*=\s*(\d)", fragment)
+    assert placed == [("dz_calibration", stated.region, str(stated.page))]
+    sections = {path: re.findall(r'#pragma \w+_SECTION\((\w+), "(\S+)"\)', text) for path, text in files.items()}
+    in_it = [(path, what) for path, found in sections.items() for what, section in found if section == "dz_calibration"]
+    assert in_it == [(f"{name}/dz_block.c", "dz_block")]
+    assert {section for found in sections.values() for _, section in found} <= {"dz_calibration", ".TI.ramfunc"}
+
+
+@pytest.mark.parametrize("name", STATED)
+def test_the_pages_state_the_same_address(name):
+    page = (ROOT / "docs" / "reference" / "calibration.md").read_text(encoding="utf-8")
+    (row,) = (line for line in page.splitlines() if line.startswith(f"| {name} |"))
+    assert f"word `{STATED[name].origin:#x}`" in row
+    assert f"`{STATED[name].region}` of TI's `{STATED[name].file}`" in row
+
+
+PAGE = ROOT / "docs" / "howto" / "add-target.md"
+FOLDER = "codegen/dzdesign/codegen/mychip/"
+#: A paragraph that begins with a file's name, then the file.
+FILE = re.compile(r"^`([^`\n]+)`[^`]*?\n\n```\w+\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+
+
+@pytest.fixture
+def clone(tmp_path, monkeypatch):
+    """The room of a clone, with the files of the page, found before the installed one."""
+    files = dict(FILE.findall(PAGE.read_text(encoding="utf-8")))
+    assert len(files) == 5 and all(name.startswith(FOLDER) for name in files), "one folder, nothing else"
+    shutil.copytree(ROOT / "codegen", tmp_path / "codegen", ignore=shutil.ignore_patterns("__pycache__"))
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    for name, text in files.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path / 'codegen'}{os.pathsep}{os.environ.get('PYTHONPATH', '')}")
+    return tmp_path
+
+
+@pytest.mark.slow
+@needs_compiler
+@pytest.mark.skipif(shutil.which("bash") is None, reason="the page's commands need bash")
+def test_the_page_adds_a_target_that_goes_through_the_whole_chain(clone, request):
+    assert try_page(PAGE, clone, request.config.getoption("--update-docs")) == []
+    manifest = json.loads((clone / "firmware" / "manifest.json").read_text())
+    assert manifest["target"] == "mychip" and manifest["board"] == ["mychip/pins.c"]
+    evidence = json.loads((clone / "evidence" / "verification.json").read_text())
+    assert evidence["target"] == "mychip" and evidence["holds"] is True
+    assert "mychip" in (clone / "evidence" / "report.html").read_text(encoding="utf-8")
+    firmware = clone / "firmware"
+    sources = [*firmware.glob("core/*.c"), *firmware.glob("mychip/*.c")]
+    command = [host_compiler(), *STRICT, "-I", str(firmware / "core"), *map(str, sources), "-o", str(clone / "mychip")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert len(sources) == 4 and done.returncode == 0, done.stderr

@@ -15,7 +15,6 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.side_law import Sides
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.toolchain.host_compiler import host_compiler, words_of
-from tests.support.c_library import load_library
 from tests.support.documented_commands import FILE
 from tests.support.golden_firmware import FULL, golden_compensator
 from tests.support.paths import ROOT
@@ -140,61 +139,6 @@ def read_by_the_page(tmp_path, firmware, sign) -> tuple[int, str]:
 def test_the_compiled_core_gives_every_vector(name, sign, firmwares, tmp_path):
     status, said = read_by_the_page(tmp_path, firmwares[name], sign)
     assert (status, said) == (0, f"{firmwares[name].manifest.vectors} vectors, 0 wrong\n")
-
-
-#: What is wrong, and how the C says it: a pattern, and what stands in its place.
-FAULTS = {
-    "a node of the law's table": (r"(\.nodes = \{(?:[^\n]*\n){9} *\{UINT32_C\()\d", r"\g<1>9"),
-    "the law's smallest beta": (r"(\{UINT32_C\()\d(?=\d*\), UINT32_C\(\d+\)\}, /\* pressures)", r"\g<1>2"),
-    "a node of the table at zero": (r"(\.nodes = \{(?:[^\n]*\n){9} *\{UINT32_C\(\d+\), UINT32_C\()\d", r"\g<1>9"),
-    "the smallest beta at zero": (r"(\{UINT32_C\(\d+\), UINT32_C\()\d(?=\d*\)\}, /\* pressures)", r"\g<1>2"),
-    "the zero band's end": (r"(\.band_end =) (\d+)u", r"\1 \2u + 1u"),
-    "least valid command": (r"(\.command_low =) 0u", r"\1 1u"),
-    "largest valid command": (r"(\.command_high =) 4095u", r"\1 4096u"),
-    "least valid pressure A": (r"(\.a_low =) (\d+)u", r"\1 \2u - 1u"),
-    "largest valid pressure A": (r"(\.a_high =) (\d+)u", r"\1 \2u + 1u"),
-    "least valid pressure B": (r"(\.b_low =) (\d+)u", r"\1 \2u + 1u"),
-    "largest valid pressure B": (r"(\.b_high =) (\d+)u", r"\1 \2u - 1u"),
-    "weight of sensor B": (r"(\.weight_b = UINT32_C\(\d+\))", r"\1 + 1u"),
-    "no pressure": (r"(\.balance = UINT32_C\(\d+\))", r"\1 + 4096u"),
-    "a failed difference": (r"(\.reverse = UINT32_C\(\d+\))", r"\1 - 4096u"),
-    "the highest tested drop": (r"(\.tested_to = UINT32_C\(\d+\))", r"\1 + 4096u"),
-    "width of the zero band": (r"(\.zero_band =) (\d+)u", r"\1 \2u - 1u"),
-    "width of the transition": (r"(\.transition_codes =) (\d+)u", r"\1 \2u - 1u"),
-    "the output's limit": (r"(\.quotient_limit = UINT32_C\(\d+\))", r"\1 + UINT32_C(2047)"),
-    "rounding": (r"(\.half =) \{[^}]*\}", r"\1 {0u, 0u}"),
-    "the law's slope": (r"(\.slope = UINT32_C\(\d+\))", r"\1 + 1u"),
-    "the shift of the nodes": (r"(#define BETA_STEP_SHIFT) 6u", r"\1 7u"),
-    "pressures turned round": (r"(return )(\(p_a << WEIGHT_SHIFT\) - \(p_b \* block->weight_b\));?", r"\g<1>0u - (\2)"),
-    "an invalid command is not let go": (r"(~below_zero\(from_band\), beta\)\)) & ~let_go", r"\1"),
-    "the status of sensor B": (r"\(\(b >> 31\) \* DZ_STATUS_PRESSURE_B\)", "0u"),
-    "beta for a display": (r"\(side->beta_shift & LARGEST_WIDE_SHIFT\)", "(side->beta_shift + 1u)"),
-}  # fmt: skip
-
-
-@needs_compiler
-def test_every_kind_of_fault_is_caught_by_the_fewest_vectors(firmwares):
-    """The core once more for each fault, in one file: what a file may have once gets a number."""
-    firmware = firmwares[FULL_SET]
-    _, rows = table(firmware)
-    files = {name: firmware.files[f"core/{name}"] for name in ("dz_comp.c", *HEADERS)}
-    law = re.sub(r'#include "dz_[^\n]*', "", files["dz_valve.h"] + files["dz_comp.c"])
-    core = re.sub(r"#(?:ifndef|define) DZ_VALVE_H\n|(?<=\};\n)\n#endif", "", law)
-    once = {*re.findall(r"^(?:static )?(?:inline )?\w+ (\w+)\(", core, re.MULTILINE), "dz_valve", "betas", "betas_at"}
-    undefined = "".join(f"#undef {symbol}\n" for symbol in re.findall(r"^#define (\w+)", core, re.MULTILINE))
-    cores = '#include "dz_comp.h"\n'
-    for place, (fault, (pattern, instead)) in enumerate({"none": ("$", ""), **FAULTS}.items()):
-        wrong, count = re.subn(pattern, instead, core, count=1)
-        assert count == 1, f"{fault} has no place in the C"
-        cores += re.sub(rf"\b({'|'.join(once)})\b(?!\.h)", rf"\g<1>_{place}", wrong) + undefined
-    library = load_library({"cores.c": cores, **{name: files[name] for name in HEADERS[:2]}}, "cores", ["-O0", "-w"])
-    caught = []
-    for place in range(1 + len(FAULTS)):
-        comp, status, beta = (getattr(library, f"dz_{name}_{place}") for name in ("comp", "status", "beta"))
-        found = ((comp(*row[:3]), status(*row[:3]), beta(*row[1:3])) for row in rows)
-        answers = [tuple(value & 0xFFFF for value in each) for each in found]  # of 16 bits
-        caught.append(answers != [row[3:6] for row in rows])
-    assert [fault for fault, seen in zip(("none", *FAULTS), caught, strict=True) if not seen] == ["none"]
 
 
 # ---- verify ----

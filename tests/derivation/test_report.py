@@ -267,12 +267,10 @@ def test_an_unknown_equation_names_the_nearest(derive, wanted, near):
 
 
 def test_an_unknown_format_and_a_missing_equation_are_refused(found, wording):
-    with pytest.raises(InputError) as caught:
+    with wording.refusal(InputError, "the account: an unknown format"):
         report.render(found, "htm")
-    wording("the account: an unknown format", str(caught.value))
-    with pytest.raises(RequirementError) as caught:
+    with wording.refusal(RequirementError, "the account: a missing equation"):
         report.render([verdict for verdict in found if verdict.number != "(20)"], "json")
-    wording("the account: a missing equation", str(caught.value))
 
 
 # --- exit status and files ----------------------------------------------------------------------------------

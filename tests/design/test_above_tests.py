@@ -1,13 +1,10 @@
 """Above the highest tested pressure drop: what each `--above` drives at zero command, on truths of the test's own."""
 
-from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
 import pytest
 
-from dzdesign.core.errors import RequirementError
-from dzdesign.design.certificate import with_certificates
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.verify.exhaustive.all_inputs import check_above
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
@@ -156,11 +153,3 @@ class TestFaults:
         exact, found, drive = self.drives(released)
         drive[-3:] = 5
         assert check_above(exact, found, drive).not_released > 0
-
-    def test_a_table_that_is_held_is_not_certified_as_lowered(self, lowered):
-        nodes, first = list(lowered.positive.beta), round(lowered.signals.dp_code(Fraction(5))) // 64 + 2
-        nodes[first:] = [nodes[first]] * len(nodes[first:])
-        side = replace(lowered.positive, beta=tuple(nodes))
-        forged = replace(lowered, sides=replace(lowered.sides, positive=side))
-        with pytest.raises(RequirementError, match="exceeds the certified one"):
-            with_certificates(forged)

@@ -2,20 +2,16 @@
 
 import pytest
 
-from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
 from dzdesign.design.ceiling import offset_ceiling
 from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.lot_setting import lot_setting
 from dzdesign.design.machine import allowance_of
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.valve.model import ValveModel
 from tests.support.designs import BOTH_SIGNS, designed
-from tests.support.paths import GOLDENS_FULL
+from tests.support.golden_firmware import FULL, golden_valve
 from tests.support.repeatable_valves import identify
 from tests.support.synthetic import Truth, synthetic_ramp
-
-BOTH_SIDES = GOLDENS_FULL / "valve.json"
 
 
 def valve(knee, pressures=(1.0, 2.5, 5.0), *, seed=0, curve=None):
@@ -58,8 +54,7 @@ def test_of_valves_that_are_alike_it_is_their_own(falling):
 
 @pytest.mark.slow
 def test_both_signs():
-    found = read_artefact(BOTH_SIDES.read_bytes(), ValveModel, "valve.json")
-    each = designed(found, transition="off", command_signal=BOTH_SIGNS)
+    each = designed(golden_valve(FULL), transition="off", command_signal=BOTH_SIGNS)
     common = lot_setting({"a": each, "b": each}).compensator
     assert (common.positive, common.negative) == (each.positive, each.negative)
     assert highest_over(common, each, "negative", -1) <= 0
@@ -77,6 +72,5 @@ def test_what_has_no_common_setting_is_told_why(falling, rising, wording):
         "another law": {"a": falling, "b": designed(rising.valve, law="target")},
         "a transition": {"a": with_transition, "b": with_transition},
     }.items():
-        with pytest.raises(InputError) as caught:
+        with wording.refusal(InputError, f"a lot setting: {what}"):
             lot_setting(batch)
-        wording(f"a lot setting: {what}", str(caught.value))

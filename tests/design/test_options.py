@@ -19,10 +19,9 @@ from dzdesign.design.target_inputs import Converter
 from dzdesign.identify.valve.model import ValveModel
 from tests.support.attacked_firmware import sealed
 from tests.support.designs import BOTH_SIGNS, CURRENT, MACHINES, designed, options
-from tests.support.paths import GOLDENS_FULL, ROOT
+from tests.support.golden_firmware import FULL, golden_valve
+from tests.support.paths import ROOT
 
-#: A valve with both sides.
-BOTH_SIDES = GOLDENS_FULL / "valve.json"
 DUTY, AMPLIFIER = MACHINES["duty"], MACHINES["amplifier"]
 
 REFUSED = [
@@ -75,6 +74,28 @@ REFUSED = [
     (AMPLIFIER | {"pressure_converter": "15 codes"}, "--pressure-converter"),
     (AMPLIFIER | {"pressure_error": "0.1 % / 1 % / 2 %"}, "--pressure-error"),
     (AMPLIFIER | {"bench_pressure_error": "-1 MPa"}, "--bench-pressure-error"),
+    # Debounce, latch and interlock.
+    ({"fault_debounce": "0 samples"}, "--fault-debounce is 0 samples, expected 1 to 10000"),
+    ({"fault_debounce": "9 s"}, "--fault-debounce is 11250 samples, expected 1 to 10000"),
+    ({"fault_debounce": "-4 ms"}, "--fault-debounce is -5 samples, expected 1 to 10000"),
+    ({"fault_debounce": "5"}, "--fault-debounce is '5', expected '5 samples' or a time"),
+    ({"fault_debounce": "2.5 samples"}, "--fault-debounce is '2.5 samples', expected '5 samples' or a time"),
+    ({"fault_latch": "yes"}, "--fault-latch is 'yes', expected on or off"),
+    ({"interlock": "1"}, "--interlock is '1', expected on or off"),
+    # A controlled current.
+    (CURRENT | {"drive": "curent"}, "--drive"),
+    (CURRENT | {"drive": "duty"}, "--coil"),
+    (CURRENT | {"coil": ""}, "--coil"),
+    (CURRENT | {"coil": "3.5 ohm"}, "--coil"),
+    (CURRENT | {"coil": "3.5 V 40 mH"}, "--coil"),
+    (CURRENT | {"coil": "0 ohm 40 mH"}, "--coil"),
+    (CURRENT | {"supply": "32..18 V"}, "--supply"),
+    (CURRENT | {"rated_current": "1"}, "--rated-current"),
+    (CURRENT | {"current_signal": "0..1.2 A on 4 ohm"}, "4"),
+    (CURRENT | {"current_signal": "0..0.5 A on 2 ohm + 0.15 V"}, "--current-signal"),
+    (CURRENT | {"current_signal": "0..1.2 A on 2 ohm + 0.15 V = 0..2.4 A"}, "--current-signal"),
+    (CURRENT | {"current_signal": "0..1.2 V x 2 + 0.15 V"}, "--current-signal"),
+    (CURRENT | {"supply_signal": "0..24 V x 0.075"}, "--supply-signal"),
 ]
 
 
@@ -119,14 +140,14 @@ def test_the_command_line_refuses_and_writes_nothing(example_valve, tmp_path, ca
 
 
 def test_a_side_that_is_left_out_is_named():
-    valve = read_artefact(BOTH_SIDES.read_bytes(), ValveModel, "valve.json")
+    valve = golden_valve(FULL)
     assert any("the valve's negative side is left out" in line for line in designed(valve).costs)
     both = designed(valve, command_signal=BOTH_SIGNS, command_error="1.9 % + 1 code").costs
     assert not any("left out" in line for line in both) and any("must pass zero by 2.05%" in line for line in both)
 
 
 def test_a_guard_that_one_side_lacks_is_refused_with_those_that_serve_both():
-    document = json.loads(BOTH_SIDES.read_text())
+    document = json.loads(to_json_bytes(golden_valve(FULL)))
     del document["sides"]["negative"]["certified"]["mean"]
     valve = read_artefact(json.dumps(sealed(document)).encode(), ValveModel, "valve.json")
     with pytest.raises(InputError, match=r"negative side's ramp tests do not bound the mean .* take --guard closing"):
@@ -157,6 +178,9 @@ def test_the_integers_of_the_drive_functions():
     assert (found.error.zero_band_codes, functions.leave_zero_codes) == (34, 39)
     assert (functions.compare_limit, options().drive_functions(32).leave_zero_codes) == (54000, 24)
     assert options().drive_functions(0).leave_zero_codes == 0  # one sign has no other solenoid
+    watched = options(fault_debounce="4.1 ms", fault_latch="on", interlock="off")
+    assert (watched.fault_samples, watched.fault_latch, watched.interlock) == (6, True, False)
+    assert (options().fault_samples, options(fault_debounce="1 sample").fault_samples) == (5, 1)
 
 
 @pytest.mark.parametrize(("signal", "band"), [("0..10 V x 0.3", 19), (BOTH_SIGNS, 34), ("4..20 mA on 150 ohm", 25)])
@@ -194,18 +218,14 @@ def test_the_words_of_a_machine_are_the_declared_numbers():
 
 def test_a_valve_that_lacks_what_is_asked_for_is_refused(example_valve, wording):
     without_opening = dataclasses.replace(example_valve.positive, opening_curve=None)
-    with pytest.raises(InputError) as caught:
+    with wording.refusal(InputError, "design: a transition without an opening branch"):
         designed(dataclasses.replace(example_valve, sides={"positive": without_opening}), transition="1 %")
-    wording("design: a transition without an opening branch", str(caught.value))
-    with pytest.raises(InputError) as caught:
+    with wording.refusal(InputError, "design: an untested side"):
         designed(example_valve, command_signal=BOTH_SIGNS)
-    wording("design: an untested side", str(caught.value))
-    with pytest.raises(InputError) as caught:
+    with wording.refusal(InputError, "design: no positive side"):
         design(dataclasses.replace(example_valve, sides={"negative": example_valve.positive}))
-    wording("design: no positive side", str(caught.value))
-    with pytest.raises(InputError) as caught:
+    with wording.refusal(InputError, "design: a short span"):
         designed(example_valve, pressure_span="4 MPa")
-    wording("design: a short span", str(caught.value))
 
 
 def test_a_valve_without_an_opening_branch_has_no_transition_unless_asked(example_valve):

@@ -161,9 +161,8 @@ def test_another_target_is_refused_where_a_code_is_another_voltage(example_valve
     compensator = designed(example_valve, "cortex-m4", pressure_a="4..20 mA on 140 ohm")
     inputs = target_named("f280049c").inputs()
     alike = replace(compensator, target=inputs)
-    with pytest.raises(InputError) as caught:
+    with wording.refusal(InputError, "design: another converter"):
         generate(alike, "f28335")
-    wording("design: another converter", str(caught.value))
     path = tmp_path / "compensator.json"
     path.write_bytes(to_json_bytes(compensator))
     assert main(["codegen", str(path), "-o", str(tmp_path / "firmware"), "--target", "f280049c"]) == 2
@@ -177,9 +176,8 @@ def test_a_target_without_a_converter_is_wired_for_the_one_of_the_design(example
 
 
 def test_an_unknown_target_in_the_file_is_named(document, wording):
-    with pytest.raises(InputError) as caught:
+    with wording.refusal(InputError, "design: an unknown target"):
         generate(read(edited(document, ("target", "name"), lambda _: "f28336")))
-    wording("design: an unknown target", str(caught.value))
 
 
 def test_the_target_is_compared_with_the_one_of_that_name(document):

@@ -7,28 +7,22 @@ from dataclasses import replace
 
 import pytest
 
-from dzdesign.assess.assessment import (
-    Assessment,
-    BeforeAfter,
-    MeterTaken,
-    PressureAssessment,
-    RampSet,
-    Recording,
-    Request,
-)
-from dzdesign.assess.limits import LimitResult
-from dzdesign.assess.quantities import Quantity, Reading
+from dzdesign.assess.assessing import assess
+from dzdesign.assess.assessment import Recording
+from dzdesign.assess.options import AssessOptions
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import MANIFEST_NAME
 from dzdesign.core.artefact_reading import read_artefact
-from dzdesign.core.artefact_types import THIS_TOOL, to_json_bytes
+from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.documents import sha256_of, to_json
 from dzdesign.core.errors import InputError
+from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.artefacts import read_chain
 from dzdesign.report.summary import headline
 from dzdesign.report.valve_report import REPORT_NAME, report_of_folder
 from tests.support.attacked_firmware import add
+from tests.support.bench_recordings import AFTER, BEFORE, record
 from tests.support.reported import change_evidence, change_json
 from tests.support.synthetic import needs_compiler
 
@@ -183,33 +177,14 @@ def test_a_manifest_reaches_no_file_outside_its_folder(copied, tmp_path):
 @pytest.mark.slow
 def test_a_missed_limit_of_recordings_does_not_hold_and_a_strangers_assessment_is_not_shown(copied):
     valve = read_artefact((copied / "valve.json").read_bytes(), ValveModel, "valve.json")
-    after = Reading(value=4.5, se=None, at_most=None, not_observable=None, note=None, where=None)
-    ramps = RampSet(source="ramp.csv", ramps=("ramp.csv 1",), dp_MPa=1.0)
-    assessment = Assessment(
-        tool=THIS_TOOL,
+    options = AssessOptions(reading=IdentifyOptions(meter_lag=0.0), limits={"hysteresis": 0.0001})
+    assessment = replace(
+        assess([record(BEFORE, seed=1)], [record(AFTER, seed=2)], options),
         made_from=tuple(Recording(source=each.source, sha256=each.sha256, set="before") for each in valve.made_from),
-        options=Request(
-            u_max_V=10.0, after_u_max_V=10.0, knee_window=(0.1, 0.5), linearity_window=(0.1, 0.9),
-            reading_flow_L_min=None, reading_share=0.01, same_pressure_within=0.05,
-        ),
-        meter=MeterTaken(floor_L_min=0.1, lag_s=0.0, lag_is="unknown"),
-        quantities={"hysteresis": Quantity(name="hysteresis", unit="%", formula="f")},
-        pressures=(
-            PressureAssessment(
-                side="positive", dp_MPa=1.0, reading_flow_L_min=0.1, rated_flow_L_min=15.0, before=ramps, after=ramps,
-                quantities={"hysteresis": BeforeAfter(before=None, after=after, change=None)},
-            ),
-        ),
-        limits=(
-            LimitResult(
-                quantity="hysteresis", place="1 MPa", limit=4.0, unit="%", holds=False, text="4.5 %, more than 4 %"
-            ),
-        ),
-        notes=(),
-    )  # fmt: skip
+    )
     (copied / "assessment.json").write_bytes(to_json_bytes(assessment))
     judged = headline(read_chain(copied))
-    assert judged.kind == "bad" and judged.reasons[0].endswith("4.5 %, more than 4 %")
+    assert judged.kind == "bad" and "more than the limit of 0.01 %" in judged.reasons[0]
     other = replace(assessment, made_from=(Recording(source="other.csv", sha256="0" * 64, set="before"),))
     (copied / "assessment.json").write_text(to_json(json.loads(to_json_bytes(other))))
     chain = read_chain(copied)

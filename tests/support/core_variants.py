@@ -6,7 +6,6 @@ from fractions import Fraction
 from functools import cache
 
 from dzdesign.codegen.project import Firmware, generate, target_named
-from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
@@ -14,9 +13,8 @@ from dzdesign.design.signal_text import command_signal, parse_signal, pressure_s
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import Converter
 from dzdesign.identify.valve.guard_curve import OpeningCurve
-from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.side_model import SideModel
-from tests.support.golden_firmware import GOLDENS
+from tests.support.golden_firmware import golden_valve
 
 TARGET = "f28335"
 ADC = Converter()
@@ -68,8 +66,7 @@ NAMES = tuple(VARIANTS)
 def variant(name: str) -> Compensator:
     """Design a variant."""
     target = target_named(TARGET)
-    content = (GOLDENS / "valve.json").read_bytes()
-    valve = read_artefact(content, ValveModel, "valve.json")
+    valve = golden_valve()
     options = dict(VARIANTS[name])
     given = options.pop("signals", {})
     signals = Signals(compare_max=target.compare_max, sample_Hz=target.sample_Hz, tick_Hz=target.tick_Hz, **given)

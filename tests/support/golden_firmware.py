@@ -1,4 +1,4 @@
-"""The goldens: what targets' files were from one small compensator.json, and how they are made anew.
+"""The goldens: what targets' files were from one small valve.json, and how they are made anew.
 
 The second set, `FULL`, has everything switched on: a valve of two unlike sides, a transition, ramps, dither, a largest
 output, 4-20 mA sensors of unlike spans. A file that is the same for several targets stands once.
@@ -12,8 +12,7 @@ from fractions import Fraction
 from functools import cache
 from pathlib import Path
 
-from dzdesign.codegen.project import TARGET_NAMES, generate, target_named
-from dzdesign.codegen.target import folder_of
+from dzdesign.codegen.project import generate, target_named
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.design.compensator import Compensator
@@ -30,13 +29,12 @@ from tests.support.synthetic import Truth, synthetic_ramp
 
 GOLDENS = TESTS / "goldens"
 FULL = TESTS / "goldens_full"
-#: What is kept, by root and target: folders of the firmware. Of the other targets it is their own folder, by default.
+#: What is kept, by root and target: folders of the firmware.
 KEPT = {
     (GOLDENS, "host"): ("core", "host"),
     (FULL, "f28335"): ("core", "f28335"),
     (FULL, "cortex-m4"): ("cortex_m4",),
 }
-KEPT |= {(GOLDENS, name): (folder_of(name),) for name in TARGET_NAMES if name not in {target for _, target in KEPT}}
 #: Not compared: it is what goes in.
 INPUT = "compensator.json"
 LINES_SHOWN = 60
@@ -70,21 +68,26 @@ def full_options(**changes) -> DesignOptions:
 
 
 @cache
-def golden_compensator(target_name: str, root: Path = GOLDENS) -> Compensator:
-    """The fixed compensator, with the scalings of a target that has its own."""
-    target = target_named(target_name)
-    compensator = read_artefact((root / INPUT).read_bytes(), Compensator, INPUT)
-    if target.takes_any_signals or root == FULL:
-        return compensator
+def golden_valve(root: Path = GOLDENS) -> ValveModel:
+    """The valve of a set: of one sign of command, or of both with everything switched on."""
+    return read_artefact((root / "valve.json").read_bytes(), ValveModel, "valve.json")
+
+
+@cache
+def golden_compensator(target_name: str = "host", root: Path = GOLDENS) -> Compensator:
+    """The compensator of a set, with the scalings of a target that has its own."""
+    target, valve = target_named(target_name), golden_valve(root)
+    if root == FULL:
+        return design(valve, full_options())
+    if target.takes_any_signals:
+        return design(valve)
     # Half a count of another PWM is another voltage, so the offset is chosen anew under its bound.
-    signals = replace(compensator.signals, compare_max=target.compare_max)
-    designed = design(compensator.valve, DesignOptions(law=compensator.law, signals=signals))
-    return replace(designed, made_from=compensator.made_from)
+    return design(valve, DesignOptions(signals=Signals(compare_max=target.compare_max)))
 
 
 @cache
 def generated(target_name: str, root: Path = GOLDENS) -> Mapping[str, str]:
-    """Generate a target's files from the fixed compensator, without that itself."""
+    """Generate a target's files, without the compensator itself."""
     files = dict(generate(golden_compensator(target_name, root), target_name).files)
     del files[INPUT]
     return files
@@ -122,7 +125,12 @@ def differences(folder: Path, files: Mapping[str, str]) -> str:
     return "".join(said)
 
 
-def golden_valve(root: Path) -> ValveModel:
+def golden_folder(target_name: str, folder: Path, root: Path = GOLDENS) -> Path:
+    """Write a target's files with the compensator that they are of, and return the folder."""
+    return write(folder, generate(golden_compensator(target_name, root), target_name).files)
+
+
+def identified_valve(root: Path) -> ValveModel:
     """Identify the valve of a set from ramps of its own: of one side, or of two that are unlike."""
     drops = (1.0, 3.0, 5.0)
     if root == GOLDENS:
@@ -141,15 +149,15 @@ def _ramp(dp_MPa: float, knee_V: float, slope: float, name: str = "synthetic") -
 
 
 def update() -> None:
-    """Identify and design anew, and write the files."""
-    for root, options in ((GOLDENS, None), (FULL, full_options())):
-        valve = golden_valve(root)
-        (root / "valve.json").write_bytes(to_json_bytes(valve))
-        (root / INPUT).write_bytes(to_json_bytes(design(valve, options)))
+    """Write the files anew, from valves that are identified and compensators that are designed anew."""
+    for root in (GOLDENS, FULL):
+        (root / "valve.json").write_bytes(to_json_bytes(identified_valve(root)))
+    golden_valve.cache_clear()
+    golden_compensator.cache_clear()
+    for root in (GOLDENS, FULL):
+        (root / INPUT).write_bytes(to_json_bytes(golden_compensator("host", root)))
         for folder in root.iterdir():
             if folder.is_dir() and folder.name != "schemas":
                 shutil.rmtree(folder)
-    golden_compensator.cache_clear()
-    generated.cache_clear()
     for root, target in KEPT:
         write(root / target, golden_files(target, root))

@@ -4,17 +4,10 @@ import pytest
 
 from dzdesign.codegen.other_targets import generate_output
 from dzdesign.codegen.writing import write_generated
-from dzdesign.core.artefact_reading import read_artefact
-from dzdesign.design.compensator import Compensator
 from dzdesign.verify.outputs.texts import available_octave
 
 OCTAVE = available_octave().path or None
 needs_octave = pytest.mark.skipif(OCTAVE is None, reason="no octave-cli on the path: apt install octave")
-
-
-def compensator_of(root):
-    """Return a golden compensator."""
-    return read_artefact((root / "compensator.json").read_bytes(), Compensator, "compensator.json")
 
 
 def output_of(made):

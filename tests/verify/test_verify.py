@@ -1,8 +1,9 @@
 """The checkers are checked: faults seeded in the C, in the law and in the design must be seen."""
 
 import json
-import re
-from fractions import Fraction
+import os
+import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,41 +16,20 @@ from dzdesign.verify.closed_loop.plant import Plant
 from dzdesign.verify.closed_loop.ramps import dead_zone
 from dzdesign.verify.closed_loop.scene import scenes_of
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
-from dzdesign.verify.exhaustive.exact_law import ExactLaw
-from dzdesign.verify.folder import Regenerated, read_compensator, read_firmware_manifest, reproduced
+from dzdesign.verify.folder import (
+    Regenerated,
+    check_firmware_inside,
+    read_compensator,
+    read_firmware_manifest,
+    reproduced,
+)
+from tests.support.attacked_firmware import add, edit
 from tests.support.evidence import verify
 from tests.support.synthetic import needs_compiler, with_side
 
 pytestmark = needs_compiler
 
 QUICK = RampSequence(rest=0.5, ramp=4.0, top=0.5)
-
-
-def mutate(folder, pattern: str, replacement, file: str = "dz_comp.c") -> None:
-    """Change one place of the generated core."""
-    source = folder / "core" / file
-    text = source.read_text()
-    changed, count = re.subn(pattern, replacement, text, count=1)
-    assert count == 1 and changed != text, pattern
-    source.write_text(changed)
-
-
-def test_the_generated_core_equals_the_law_on_every_input(firmware_folder):
-    result = check_all_inputs(firmware_folder)
-    assert result.holds
-    assert result.inputs == 4096 * (2 * 3326 + 1)
-    assert result.wrong == 0 and result.largest_error == 0
-
-
-def test_a_missing_limit_is_found_where_the_law_reaches_full_drive(example_compensator, tmp_path):
-    from dzdesign.codegen.project import generate
-
-    long_stroke = with_side(example_compensator, drive_range_over_u_max=Fraction(3, 4))
-    firmware = generate(long_stroke, "f28335")
-    write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
-    assert check_all_inputs(tmp_path / "fw").holds
-    mutate(tmp_path / "fw", r"at_most\(sum, side->quotient_limit\)", "sum")
-    assert not check_all_inputs(tmp_path / "fw").holds
 
 
 def test_an_offset_above_the_bound_is_over_compensation(example_compensator, tmp_path):
@@ -73,32 +53,25 @@ def fault_of(folder, manifest):
 
 @pytest.mark.parametrize(
     "name",
-    ["core/my.c", "f28335/extra.c", "more/extra.CPP", "f28335/x.asm", "F28335.cmd", "f28335/my.projectspec", "my.mk"],
-)
-def test_source_and_project_files_that_were_added_are_refused(firmware_folder, name, wording):
+    ["core/my.c", "core/board/adc.c", "f28335/extra.c", "more/extra.CPP", "f28335/x.asm", "F28335.cmd",
+     "f28335/my.projectspec", "my.mk"],
+)  # fmt: skip
+def test_source_and_project_files_that_were_added_are_refused(firmware_folder, name):
     manifest = read_firmware_manifest(firmware_folder)
     for built in ("f28335/main.o", "f28335/firmware.out", "f28335/firmware.map"):
         (firmware_folder / built).write_text("")
     assert fault_of(firmware_folder, manifest) == ""
-    (firmware_folder / name).parent.mkdir(exist_ok=True)
-    (firmware_folder / name).write_text("")
-    wording.of_test(fault_of(firmware_folder, manifest))
+    add(firmware_folder, name)
+    assert fault_of(firmware_folder, manifest).startswith(f"not generated: {name}; keep your own")
 
 
 def test_what_cmake_built_may_stay_where_nothing_of_ours_is(firmware_folder, wording):
     manifest = read_firmware_manifest(firmware_folder)
     for name in ("build/CMakeCache.txt", "build/Makefile", "build/CMakeFiles/3.30/CMakeCCompilerId.c"):
-        (firmware_folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (firmware_folder / name).write_text("")
+        add(firmware_folder, name)
     assert fault_of(firmware_folder, manifest) == ""
     for name in ("f28335/CMakeCache.txt", "f28335/extra.c", "CMakeCache.txt"):
         (firmware_folder / name).write_text("")
-    wording.of_test(fault_of(firmware_folder, manifest))
-
-
-def test_a_header_that_may_be_taken_for_ours_is_said(firmware_folder, wording):
-    manifest = read_firmware_manifest(firmware_folder)
-    (firmware_folder / "f28335" / "dz_comp.h").write_text("#define DZ_COMPARE_MAX 1u\n")  # goes before core's
     wording.of_test(fault_of(firmware_folder, manifest))
 
 
@@ -110,19 +83,9 @@ def test_a_manifest_that_names_no_file_is_no_evidence(firmware_folder, wording):
 
 
 def test_a_core_that_does_not_compile_fails_the_verification(firmware_folder):
-    mutate(firmware_folder, r"const uint64_t sum = \(\(whole\b", "const uint64_t sum = ((whale")
+    edit(firmware_folder, "core/dz_comp.c", "const uint64_t sum = ((whole", "const uint64_t sum = ((whale")
     result = verify(firmware_folder, sequence=QUICK)
     assert not result.holds and result.evidence.inputs == ()
-
-
-def test_reference_agrees_with_the_compensator_at_random(example_compensator):
-    exact = ExactLaw(example_compensator)
-    rng = np.random.default_rng(3)
-    codes = [int(code) for code in rng.integers(-3326, 3327, 40)]
-    for code in codes:
-        corners = exact.corners(exact.betas(code))
-        for command in (*range(0, 4095, 97), 4095):
-            assert exact.compare_value(command, corners) == example_compensator.compare(command, code)
 
 
 class TestPlant:
@@ -179,3 +142,58 @@ def test_a_span_that_ends_at_the_tested_pressure_can_be_verified(example_valve, 
     write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
     scenes = scenes_of(tmp_path / "fw", read_compensator(tmp_path / "fw"), None)
     assert len(scenes) > 1 and all(scene.back_MPa >= 0 for scene in scenes)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    for name in ("compensator.json", "core/dz_comp.c", "board/my.c"):
+        add(tmp_path, name)
+    return tmp_path
+
+
+@pytest.mark.parametrize("name", ["core/dz_comp.c", "board/my.c"])
+def test_a_file_without_permission_is_refused(folder, monkeypatch, name):
+    allowed = os.access
+    monkeypatch.setattr(os, "access", lambda path, mode: allowed(path, mode) and not str(path).endswith(name))
+    with pytest.raises(InputError, match=f"{name}' can't be read"):
+        check_firmware_inside(folder)
+
+
+def test_a_folder_without_permission_is_refused_and_not_passed_over(folder, monkeypatch):
+    listed = os.scandir
+
+    def scandir(path):
+        if str(path).endswith("board"):
+            raise PermissionError(13, "Permission denied", str(path))
+        return listed(path)
+
+    monkeypatch.setattr(os, "scandir", scandir)
+    with pytest.raises(InputError, match="board' can't be read: Permission denied"):
+        check_firmware_inside(folder)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="names are bytes")
+@pytest.mark.parametrize("place", ["core", "board"])
+def test_a_name_that_is_no_text_is_refused(folder, place):
+    try:
+        (folder / place / os.fsdecode(b"my\xff.c")).touch()
+    except OSError:
+        pytest.skip("this file system takes no such name")
+    with pytest.raises(InputError, match=r"my\?\.c' has a name that is no text"):
+        check_firmware_inside(folder)
+
+
+def enlarge(path: Path, octets: int = 1 << 40) -> None:
+    """Make a file huge that takes no room on the disk."""
+    with open(path, "r+b" if path.exists() else "xb") as file:
+        file.truncate(octets)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="such a file takes room there")
+@pytest.mark.parametrize("name", ["compensator.json", "f28335/more.h"])
+def test_a_file_larger_than_any_of_dzdesign_is_refused_before_it_is_read(firmware_folder, tmp_path, name):
+    folder = tmp_path / "enlarged"
+    shutil.copytree(firmware_folder, folder)
+    enlarge(folder / name, 1 << 29)
+    with pytest.raises(InputError, match=f"{name}.* is larger than 16 MiB"):
+        read_firmware_manifest(folder)

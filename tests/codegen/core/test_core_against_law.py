@@ -1,20 +1,39 @@
-"""The compiled core against the law in volts at 50 digits, and the faults in the scaling that this must see."""
+"""The integer form and the compiled core, fixed and in block form, against the exact law and the law in volts."""
 
+import dataclasses
 import random
+import re
+from dataclasses import replace
 from fractions import Fraction
 
-import casadi
 import numpy as np
 import pytest
 import sympy
 
+from dzdesign.codegen.calibration.block import block_of, built_for, numbers_of
+from dzdesign.codegen.calibration.files import block_core_files
+from dzdesign.codegen.calibration.packing import pack
+from dzdesign.codegen.core.integer_form import exact_reciprocal, integer_form
+from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_files import write_folder
+from dzdesign.core.errors import InputError
 from dzdesign.derivation import scaling
 from dzdesign.derivation.law import LAW_NAMES, law
 from dzdesign.derivation.scaling import COMMAND_CODE, COMPARE_VALUE, Line
 from dzdesign.derivation.symbols import beta, k, n_adc, n_full, u_i, u_max, u_min0, u_O, x_max
-from dzdesign.derivation.symbols import kappa as kappa_symbol
-from tests.support.synthetic import needs_compiler
+from dzdesign.design.side_design import finest_units
+from dzdesign.design.side_law import SideLaw, Sides
+from dzdesign.design.signals import CommandSignal
+from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
+from dzdesign.verify.exhaustive.exact_law import ExactLaw
+from dzdesign.verify.exhaustive.test_vectors import PreparedInputs
+from dzdesign.verify.toolchain.compiled_core import CompiledCore
+from tests.support.block_cores import block_folder
+from tests.support.core_texts import texts
+from tests.support.core_variants import firmware, variant
+from tests.support.synthetic import needs_compiler, with_side
+
+pytestmark = needs_compiler
 
 DIGITS = 50
 U_MAX_V, X_MAX_M = sympy.Integer(10), sympy.Rational(18, 10_000)
@@ -123,48 +142,167 @@ def test_a_fault_in_the_scaling_is_seen_in_the_core(fault, example_valve, tmp_pa
 
 # --- the law in counts and the pressures, in doubles of every kind ------------------------------------------
 
-#: The longest has 6 roundings, and no argument is rounded on the way in: below 8 half ulps of the sum of its terms.
-#: That sum is n_full/n_adc (beta (kappa + 1) + 1) for the slope, whose own value may cancel to less.
-BOUND = 8 * sympy.Rational(1, 2**53)
+
+def folder_of(name, form, folder):
+    if form == "block":
+        return block_folder(variant(name), folder)
+    made = firmware(name)
+    write_folder(folder, made.files, made.manifest)
+    return folder
 
 
-@pytest.mark.parametrize("seed", range(41, 47))
-@pytest.mark.parametrize("name", LAW_NAMES)
-def test_the_law_in_counts_in_doubles(name, seed):
-    draw = random.Random(seed)
-    b, kappa, share = ([draw.uniform(low, high) for _ in range(20)] for low, high in ((0.5, 1.2), (0.01, 1), (0, 1)))
-    symbols = [casadi.SX.sym(letter) for letter in "bks"]
-    arrays = [np.array(column) for column in (b, kappa, share)]
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "form"),
+    [("default", "fixed"), ("default", "block"), ("bipolar, all options", "fixed"), ("bipolar, all options", "block"),
+     ("target law, no transition", "fixed"), ("inverted", "fixed"), ("live zero", "fixed")],
+)  # fmt: skip
+def test_every_input_gives_what_the_law_does(name, form, tmp_path):
+    folder = folder_of(name, form, tmp_path / "fw")
+    for sign in variant(name).signals.signs:
+        result = check_all_inputs(folder, sign)
+        assert result.holds and result.inputs > 20_000_000, result
 
-    def line(b, kappa, share):
-        return scaling.evaluate_line(
-            law(name), beta=b, kappa=kappa, u_min0_over_u_max=share, n_adc=4095.0, n_full=60000.0
+
+def test_a_core_is_compiled_once_and_a_wrong_number_is_seen(tmp_path):
+    compensator = variant("bipolar, all options")
+    folder = block_folder(compensator, tmp_path / "fw")
+    block = block_of(compensator, "0" * 64)
+    core = CompiledCore(folder, -1)
+    sample = PreparedInputs(ExactLaw(compensator, -1)).sample()
+    right = core.check(sample, sample=True)
+    assert not right.faults
+    side = block.sides[1]
+    for wrong in (
+        {"offset": side.offset - side.offset // 1000},
+        {"nodes": (*side.nodes[:20], side.nodes[20] + 300, *side.nodes[21:])},
+        {"nodes": (*side.nodes[:-1], side.nodes[-1] + 3000)},
+        {"transition": side.transition - 1000},
+        {"room": side.room // 2},
+        {"quotient_limit": side.quotient_limit // 2},
+        {"beta_factor": side.beta_factor - side.beta_factor // 1000},
+        {"tested_to": side.tested_to // 2},
+    ):
+        octets = pack(replace(block, sides=(block.sides[0], replace(side, **wrong))))
+        found = CompiledCore(folder, -1, octets).check(sample, sample=True)
+        assert found.faults and found.object_sha256 == right.object_sha256, wrong
+
+
+def test_the_same_block_firmware_serves_other_valves_and_a_fixed_one_does_not():
+    first, second = (variant(name) for name in ("default", "no transition"))
+    assert built_for(first) == built_for(second)
+    assert texts(block_core_files(built_for(first))) == texts(block_core_files(built_for(second)))
+    assert firmware("default").files["core/dz_valve.h"] != firmware("no transition").files["core/dz_valve.h"]
+
+
+def evaluate(form, compensator, command: int, dp_code: int) -> int:
+    """Do in Python, with integers of any size, what the C is meant to do."""
+    step, codes = compensator.beta_step_codes, compensator.transition_codes
+    place = max(dp_code, 0) if dp_code >= -compensator.reverse_codes else (len(form.table) - 2) * step
+    node, share = divmod(place, step)
+
+    def between(table):
+        return table[node] * (step - share) + table[node + 1] * share
+
+    past = max(command - compensator.zero_band_codes, 0)
+    reached = min(past, codes)
+    given = codes * past + compensator.zero_band_codes * reached if codes else command
+    total = between(form.table) * (form.slope * given + form.offset)
+    total += (form.linear * given << form.linear_shift) + form.half
+    if codes:
+        total -= (between(form.table) - between(form.zero_table)) * form.transition * (codes - reached)
+    assert total >= 0
+    return min((total >> form.shift) // form.divisor, compensator.drive_functions.compare_limit)
+
+
+def random_compensators(base, count: int, seed: int):
+    """Vary every coefficient of a compensator at random, within what a valve can have."""
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        transition = int(rng.choice([0, 1, 32]))
+        units = finest_units(base.signals, transition)
+        unit = units.beta
+        falling = np.sort(rng.integers(unit // 2, unit + 1, base.nodes(1)))[::-1]
+        side = SideLaw(
+            drive_range_over_u_max=Fraction(
+                int(rng.integers(units.coefficient // 32, units.coefficient)), units.coefficient
+            ),
+            u_min0_over_u_max=Fraction(int(rng.integers(20, units.coefficient)), units.coefficient),
+            beta=tuple(int(value) for value in falling),
+            transition_beta=tuple(int(value) + unit // 16 for value in falling) if transition else None,
+            certificate=base.positive.certificate,
+        )
+        law_name = str(rng.choice(["paper", "target"]))
+        band = int(rng.integers(1, 60)) if transition else 0
+        yield dataclasses.replace(
+            base,
+            law=law_name,
+            sides=Sides(positive=side),
+            transition_codes=transition,
+            zero_band_codes=band,
+            drive_functions=dataclasses.replace(base.drive_functions, leave_zero_codes=band + 1 if band else 0),
+            beta_denominator=unit,
         )
 
-    in_casadi = casadi.Function("line", symbols, list(line(*symbols)))
-    in_numpy = line(*arrays)
-    assert all(isinstance(part, np.ndarray) for part in in_numpy)
-    for index, values in enumerate(zip(b, kappa, share, strict=True)):
-        true = scaling.law_in_counts(law(name))
-        names = dict(zip((beta, kappa_symbol, scaling.mu), map(rational, values), strict=True))
-        precise = Line(*(sympy.N(part.subs({**names, n_adc: 4095, n_full: 60000}), DIGITS) for part in true))
-        terms = Line(
-            slope=sympy.Rational(60000, 4095) * (names[beta] * (names[kappa_symbol] + 1) + 1), start=precise.start
-        )
-        for found in (line(*values), Line(*(part[index] for part in in_numpy)), Line(*map(float, in_casadi(*values)))):
-            for part, reference, scale in zip(found, precise, terms, strict=True):
-                assert abs(rational(float(part)) - reference) <= BOUND * scale
+
+@pytest.mark.parametrize("seed", range(20))
+def test_whatever_units_design_takes_the_firmware_can_count_in(example_compensator, seed):
+    """Converters, attenuators, PWMs and transitions as they come: the coarsest units of design are enough."""
+    rng = np.random.default_rng(seed)
+    compare_max = int(rng.choice([60000, 40000, 10000, 4096, 1023]))
+    span = int(rng.choice([4095, 3276, 3277, 2047, 2048, 4000, 1021]))
+    signals = dataclasses.replace(
+        example_compensator.signals, compare_max=compare_max, command=CommandSignal(full_code=span)
+    )
+    functions = dataclasses.replace(example_compensator.drive_functions, compare_limit=compare_max)
+    base = dataclasses.replace(example_compensator, signals=signals, drive_functions=functions)
+    for compensator in random_compensators(base, 6, seed):
+        form = integer_form(compensator)
+        band, end = compensator.zero_band_codes, compensator.transition_end
+        for command in (0, 1, band, band + 1, max(end - 1, 0), end, end + 1, span // 3, span - 1, span):
+            for code in (-31, -30, 0, 63, 700, 3326):
+                assert evaluate(form, compensator, command, code) == compensator.compare(command, code)
 
 
-@pytest.mark.parametrize("seed", range(51, 57))
-def test_pressures_in_doubles(seed):
-    draw = random.Random(seed)
-    codes = np.array([float(draw.randint(-4095, 4095)) for _ in range(20)])
-    found = scaling.pressure_drop(codes, span=20.0, code_max=4095)
-    symbol = casadi.SX.sym("code")
-    in_casadi = casadi.Function("dp", [symbol], [scaling.pressure_drop(symbol, span=20.0, code_max=4095)])
-    for code, dp in zip(codes, found, strict=True):
-        true = sympy.N(rational(code) * 20 / 4095, DIGITS)
-        for value in (float(dp), float(in_casadi(code))):
-            # One product that is exact here and one division: half an ulp, and half for the way CasADi may take.
-            assert abs(rational(value) - true) <= 2 * sympy.Rational(1, 2**53) * abs(true)
+@pytest.mark.slow
+def test_reciprocal_is_exact_for_every_quotient_that_can_occur(example_compensator):
+    divisor = integer_form(example_compensator).divisor
+    quotients = np.arange(0, 2 * 60000 * divisor, dtype=np.uint64)
+    reciprocal, shift = exact_reciprocal(divisor, quotients.size - 1)
+    by_product = (quotients * np.uint64(reciprocal)) >> np.uint64(shift)
+    assert np.array_equal(by_product, quotients // np.uint64(divisor))
+
+
+def test_core_has_no_floating_point_no_division_and_no_state(example_firmware):
+    code = re.sub(r"/\*.*?\*/", "", example_firmware.files["core/dz_comp.c"], flags=re.DOTALL)
+    assert not re.search(r"\b(float|double)\b|\d\.\d|%", code)
+    assert "/" not in code.replace("#include", "")
+    static_data = re.findall(r"^static (?!const )(?!(?:inline )?(?:struct )?\w+ \w+\()", code, flags=re.MULTILINE)
+    assert static_data == []
+
+
+def test_a_target_with_another_pwm_is_refused(example_compensator, wording):
+    signals = dataclasses.replace(example_compensator.signals, compare_max=30000)
+    functions = dataclasses.replace(example_compensator.drive_functions, compare_limit=30000)
+    with wording.refusal(InputError):
+        generate(dataclasses.replace(example_compensator, signals=signals, drive_functions=functions), "f28335")
+
+
+def test_scalings_too_rich_for_the_integers_are_refused(example_compensator, wording):
+    awkward = with_side(
+        example_compensator,
+        drive_range_over_u_max=Fraction(10**12 + 39, 3 * 10**12),
+        u_min0_over_u_max=Fraction(7, 10**9 + 7),
+    )
+    with wording.refusal(InputError):
+        numbers_of(awkward)
+
+
+def test_a_law_whose_divisor_cancels_needs_no_reciprocal(example_compensator):
+    even = with_side(
+        dataclasses.replace(example_compensator, law="target"), drive_range_over_u_max=Fraction(273 * 100, 65536)
+    )
+    form = integer_form(even)
+    assert form.divisor == 1
+    for command in (0, 1, 1000, 4095):
+        assert evaluate(form, even, command, 500) == even.compare(command, 500)

@@ -7,26 +7,21 @@ from itertools import pairwise
 
 import pytest
 
-from dzdesign.codegen.project import generate, target_named
+from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_files import write_folder
-from dzdesign.core.errors import InputError
 from dzdesign.design.designing import design
-from dzdesign.design.options import DesignOptions, options_of
+from dzdesign.design.options import DesignOptions
 from dzdesign.verify.exhaustive.drive_check import (
     CompiledDrive,
     PreparedDrive,
-    memories,
-    tried_commands,
-    tried_pressures,
 )
-from dzdesign.verify.exhaustive.exact_drive import DriveModel
 from tests.codegen.core.test_drive import Firmware, compensator_named
 from tests.support.golden_firmware import GOLDENS, golden_compensator
 from tests.support.synthetic import needs_compiler
 
 pytestmark = needs_compiler
 #: Bits of the status word.
-COMMAND, PRESSURE_A, PRESSURE_B, DIFFERENCE, WAITING, HELD, LATCHED = 1, 2, 4, 8, 32, 64, 128
+COMMAND, PRESSURE_A, WAITING, HELD, LATCHED = 1, 2, 32, 64, 128
 SOUND, BROKEN_A, REVERSED = (1500, 1000), (0, 1000), (1000, 1500)
 FULL, INVALID = 4095, 65535
 
@@ -35,11 +30,6 @@ FULL, INVALID = 4095, 65535
 def compensator_of(samples: int = 5, latch: bool = False, interlock: bool = True):
     valve = golden_compensator("f28335", GOLDENS).valve
     return design(valve, DesignOptions(fault_samples=samples, fault_latch=latch, interlock=interlock))
-
-
-@cache
-def firmware_of(*options):
-    return Firmware(compensator_of(*options))
 
 
 def started(*options) -> Firmware:
@@ -216,61 +206,6 @@ def test_a_seeded_fault_is_found(name, folder):
     text = drive.sources["dz_drive.c"].decode()
     assert text.count(old) == 1, old
     assert drive.edited("dz_drive.c", text.replace(old, new).encode()).check(prepared).faults > 0
-
-
-@pytest.mark.parametrize(("samples", "latch"), [(1, False), (5, True), (7, True)])
-def test_every_reachable_memory_is_tried(samples, latch):
-    """The states that a walk over all the inputs' kinds reaches are those that are put, no more."""
-    compensator = compensator_of(samples, latch)
-    commands, pressures = tried_commands(compensator), tried_pressures(compensator)
-    kinds = {0, FULL, INVALID} & set(commands)
-    pairs = [pair for pair in pressures if pair in ((0, 0), pressures[len(pressures) // 2])]
-    model, seen, todo = DriveModel(compensator), set(), []
-
-    def state() -> tuple[tuple[int, int], tuple[int, int]]:
-        return tuple((each.sound, each.faulty) for each in (model.commands, model.pressures))
-
-    todo.append(state())
-    while todo:
-        at = todo.pop()
-        if at in seen:
-            continue
-        seen.add(at)
-        for code in kinds:
-            for pair in pairs:
-                (model.commands.sound, model.commands.faulty), (model.pressures.sound, model.pressures.faulty) = at
-                model.sample(code, *pair)
-                todo.append(state())
-    known = set(memories(compensator))
-    assert {command for command, _ in seen} <= known and {pressure for _, pressure in seen} <= known
-    assert {command[0] for command, _ in seen} == set(range(samples + 1))
-
-
-@pytest.mark.parametrize(
-    ("texts", "expected"),
-    [
-        ({}, (5, False, True)), ({"fault_debounce": "1 sample"}, (1, False, True)),
-        ({"fault_debounce": "4 ms", "fault_latch": "on"}, (5, True, True)),
-        ({"fault_debounce": "4.1 ms", "interlock": "off"}, (6, False, False)),
-        ({"fault_debounce": "8 s"}, (10_000, False, True)),
-    ],
-)  # fmt: skip
-def test_the_options_are_read(texts, expected):
-    options = options_of(texts, target_named("f28335").inputs())
-    assert (options.fault_samples, options.fault_latch, options.interlock) == expected
-
-
-@pytest.mark.parametrize(
-    "texts",
-    [
-        {"fault_debounce": "0 samples"}, {"fault_debounce": "5"}, {"fault_debounce": "9 s"},
-        {"fault_debounce": "-4 ms"}, {"fault_debounce": "2.5 samples"}, {"fault_latch": "yes"}, {"interlock": "1"},
-    ],
-    ids=lambda texts: " ".join(texts.values()),
-)  # fmt: skip
-def test_what_is_no_debounce_latch_or_interlock_is_refused(texts, wording):
-    with wording.refusal(InputError):
-        options_of(texts, target_named("f28335").inputs())
 
 
 def test_without_a_transition_the_declared_error_of_the_command_counts_as_zero():

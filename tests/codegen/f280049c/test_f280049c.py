@@ -10,19 +10,19 @@ import pytest
 
 from dzdesign.codegen.f280049c.target import TARGET
 from tests.codegen.test_c2000 import (
-    CURRENT_BOARDS,
     check_both_outputs,
     check_normal_running,
     check_second_missing_samples,
     check_zero_command,
+    of_current_on,
 )
-from tests.support import current_checks
 from tests.support.c2000_devices import ONE, TWO, column, program, run, running
 from tests.support.example_coil import SENSORS
 from tests.support.synthetic import needs_compiler
 
 pytestmark = needs_compiler
 HARDWARE = "dz_hardware.c"
+of_current = of_current_on("f280049c")
 PLAIN, SUPPLY = SENSORS
 #: What the set-up calls by the form.
 CALLS = {
@@ -99,11 +99,6 @@ def test_a_busy_converter_gives_no_sample_and_the_watchdog_is_served_only_if_the
     ticks = running("f280049c")("b" * 12)
     assert set(column(ticks, "output")) == {"low"} and ticks[-1]["fault"] == 1
     assert run(program("f280049c"), "watchdog") == ["0", "1"]
-
-
-def of_current(name: str):
-    """Return a check of current control by its name, for this board."""
-    return lambda go: getattr(current_checks, f"check_{name}")(go, CURRENT_BOARDS["f280049c"])
 
 
 @pytest.mark.slow

@@ -14,16 +14,13 @@ from dzdesign.codegen.calibration.files import FINDINGS
 from dzdesign.codegen.calibration.packing import pack, unpack
 from dzdesign.codegen.f280049c.target import TARGET
 from dzdesign.codegen.project import generate
-from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
 from dzdesign.design.signals import Signals
-from dzdesign.identify.valve.model import ValveModel
-from tests.codegen.f280049c.test_f280049c import check_order, check_set_up
 from tests.support.c2000_devices import Edit, column, compiled, periods, seeded, write
 from tests.support.core_variants import BOTH
 from tests.support.example_coil import SENSORS, with_current
-from tests.support.golden_firmware import FULL, full_options, golden_compensator
+from tests.support.golden_firmware import FULL, full_options, golden_compensator, golden_valve
 from tests.support.paths import DEVICES
 from tests.support.synthetic import needs_compiler
 
@@ -46,10 +43,9 @@ TRIED = "p" + "." * 40 + "T...t....z....n....c....n....xxxxxxxxxxxx....m......h.
 
 def two_solenoids() -> Compensator:
     """Return a design with ramps, dither and transition for both solenoids; plain sensors, as the model has them."""
-    valve = read_artefact((FULL / "valve.json").read_bytes(), ValveModel, "valve.json")
     ramps = {"ramp_up_s": (0.02, 0.03), "ramp_down_s": (0.01, 0.0)}
     signals = Signals(command=BOTH, compare_max=TARGET.compare_max)
-    return design(valve, full_options(signals=signals, negative_dp="wired", **ramps))
+    return design(golden_valve(FULL), full_options(signals=signals, negative_dp="wired", **ramps))
 
 
 MADE: dict[str, Callable[[], Compensator]] = {
@@ -139,14 +135,6 @@ def test_a_valid_block_runs_as_the_fixed_form(in_blocks, tmp_path, name):
         assert {tick.pop("calibration") for tick in of_block} == {0}
         assert of_block == of_fixed
         assert number or all(len(set(column(of_fixed, fact))) > 20 for fact in used), "the output follows the law"
-
-
-@pytest.mark.parametrize("name", MADE)
-def test_the_set_up_is_that_of_the_fixed_form(in_blocks, name):
-    go = partial(periods, in_blocks[name].program)
-    if name != "current":  # whose interrupt comes later
-        check_set_up(go)
-    check_order(go)
 
 
 @pytest.mark.parametrize("name", MADE)

@@ -13,18 +13,18 @@ import pytest
 from dzdesign.codegen.f28335.target import TARGET
 from dzdesign.core.errors import DzdesignError
 from tests.codegen.test_c2000 import (
-    CURRENT_BOARDS,
     check_both_outputs,
     check_normal_running,
     check_second_missing_samples,
     check_zero_command,
     compare_of_sample,
+    of_current_on,
 )
-from tests.support import current_checks
 from tests.support.c2000_devices import ONE, TWO, column, program, run, running, texts_of
 from tests.support.synthetic import needs_compiler
 
 HARDWARE = "dz_hardware.c"
+of_current = of_current_on("f28335")
 PLAIN, SUPPLY = "supply unknown", "supply measured"
 START_VALUES = {
     "TBCTL": 0x0000, "TBPRD": 0xEA5F, "CMPCTL": 0x0000, "CMPB": 0x0BB8, "AQCTLA": 0x0012, "ETSEL": 0x090E,
@@ -181,11 +181,6 @@ def test_start_up_order_and_watchdog():
     assert run(program("f28335"), "main") == ["InitSysCtrl", "DINT", *after]
     flash = program("f28335", ONE, None, ("-D_FLASH",))
     assert run(flash, "main") == ["InitSysCtrl", "DINT", "MemCopy", "InitFlash", *after]
-
-
-def of_current(name: str):
-    """Return a check of current control by its name, for this board."""
-    return lambda go: getattr(current_checks, f"check_{name}")(go, CURRENT_BOARDS["f28335"])
 
 
 @needs_compiler

@@ -12,18 +12,18 @@ from dzdesign.codegen.project import generate, target_named
 from dzdesign.core.errors import DzdesignError, InputError
 from dzdesign.verify.outputs.texts import FLAGS
 from tests.support.example_coil import SENSORS, with_current
-from tests.support.octave import OCTAVE, compensator_of, needs_octave, output_of, written
-from tests.support.paths import GOLDENS, GOLDENS_FULL
+from tests.support.golden_firmware import FULL, GOLDENS, golden_compensator
+from tests.support.octave import OCTAVE, needs_octave, output_of, written
 
 DIGEST = "0" * 64
-CASES = {"one solenoid": (GOLDENS, 1), "two solenoids": (GOLDENS_FULL, 1), "negative": (GOLDENS_FULL, -1)}
+CASES = {"one solenoid": (GOLDENS, 1), "two solenoids": (FULL, 1), "negative": (FULL, -1)}
 INPUTS = Path(__file__).parents[2] / "support" / "matlab_inputs.m"
 
 
 @pytest.fixture(scope="module", params=CASES.values(), ids=CASES.keys())
 def text(request):
     root, sign = request.param
-    return law_function(compensator_of(root), DIGEST, sign)
+    return law_function(golden_compensator(root=root), DIGEST, sign)
 
 
 def code_of(text):
@@ -50,9 +50,9 @@ def test_numbers_beyond_a_double_are_two_factors():
 
 
 @needs_octave
-@pytest.mark.parametrize(("root", "name"), [(GOLDENS, "dz_comp"), (GOLDENS_FULL, "dz_comp_negative")])
+@pytest.mark.parametrize(("root", "name"), [(GOLDENS, "dz_comp"), (FULL, "dz_comp_negative")])
 def test_inputs_of_every_class_and_size_are_taken_or_refused_as_its_help_says(root, name, tmp_path):
-    folder = written(compensator_of(root), tmp_path / "matlab")
+    folder = written(golden_compensator(root=root), tmp_path / "matlab")
     command = [OCTAVE, *FLAGS, str(INPUTS), name, "setup_c_caller"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True, timeout=120)
     lines = done.stdout.splitlines()
@@ -66,7 +66,7 @@ def test_inputs_of_every_class_and_size_are_taken_or_refused_as_its_help_says(ro
      ("status = reshape(uint16(status), shape)", "status = uint16(status)"), ("nargin ~= 3", "nargin > 3")],
 )  # fmt: skip
 def test_a_function_that_takes_what_it_must_not_is_seen(old, new, tmp_path):
-    path = written(compensator_of(GOLDENS), tmp_path / "matlab") / "dz_comp.m"
+    path = written(golden_compensator(), tmp_path / "matlab") / "dz_comp.m"
     assert old in path.read_text()
     path.write_text(path.read_text().replace(old, new, 1))
     command = [OCTAVE, *FLAGS, str(INPUTS), "dz_comp", "setup_c_caller"]
@@ -75,7 +75,7 @@ def test_a_function_that_takes_what_it_must_not_is_seen(old, new, tmp_path):
 
 
 def test_the_folder_holds_the_c_of_the_firmware_and_is_the_same_bytes_again():
-    made = compensator_of(GOLDENS_FULL)
+    made = golden_compensator(root=FULL)
     files, firmware = output_of(made).files, generate(made, "host").files
     assert {"dz_comp.m", "dz_comp_negative.m", "setup_c_caller.m", "core/dz_comp.h", "core/dz_comp.c"} <= set(files)
     assert files == output_of(made).files
@@ -86,18 +86,18 @@ def test_the_folder_holds_the_c_of_the_firmware_and_is_the_same_bytes_again():
 
 
 def test_the_script_names_every_file_and_function_of_the_core():
-    for root, functions in ((GOLDENS, ["dz_comp"]), (GOLDENS_FULL, ["dz_comp", "dz_comp_negative"])):
-        script = output_of(compensator_of(root)).files["setup_c_caller.m"].decode()
+    for root, functions in ((GOLDENS, ["dz_comp"]), (FULL, ["dz_comp", "dz_comp_negative"])):
+        script = output_of(golden_compensator(root=root)).files["setup_c_caller.m"].decode()
         called = ", ".join(f"'{name}'" for name in functions)
         assert f"    sources = {{'dz_comp.c'}};\n    functions = {{{called}}};\n" in script
 
 
 def test_what_a_function_leaves_out_is_said():
-    note = note_of(compensator_of(GOLDENS_FULL), {})
+    note = note_of(golden_compensator(root=FULL), {})
     assert all(name in note for name in ("dither", "ramps", "debouncing", "latching", "interlock"))
 
 
 def test_current_control_is_refused(wording):
-    made = with_current(compensator_of(GOLDENS), target_named("f28335"), SENSORS["supply unknown"])
+    made = with_current(golden_compensator(), target_named("f28335"), SENSORS["supply unknown"])
     with wording.refusal(InputError):
         output_files(made, None, {})

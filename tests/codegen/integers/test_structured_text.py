@@ -11,24 +11,21 @@ from dzdesign.codegen.integers.law import block_form
 from dzdesign.codegen.integers.plc import note_of, output_files, structured_text
 from dzdesign.codegen.other_targets import OTHER_TARGETS, generate_output, settings_of
 from dzdesign.codegen.project import target_named
-from dzdesign.command_line.cli import main
-from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from tests.support.core_variants import VARIANTS, variant
 from tests.support.example_coil import SENSORS, with_current
-from tests.support.octave import compensator_of
-from tests.support.paths import GOLDENS, GOLDENS_FULL
+from tests.support.golden_firmware import FULL, GOLDENS, golden_compensator
 from tests.support.st_grammar import grammar
 from tests.support.st_words import RESERVED, is_reserved
 
-ROOTS = {"one solenoid": GOLDENS, "two solenoids": GOLDENS_FULL}
+ROOTS = {"one solenoid": GOLDENS, "two solenoids": FULL}
 DIGEST = "0" * 64
 
 
 @pytest.fixture(scope="module", params=[(name, kind) for name in ROOTS for kind in ("plc", "codes")], ids=" ".join)
 def text(request):
     name, interface = request.param
-    return structured_text(compensator_of(ROOTS[name]), DIGEST, interface)
+    return structured_text(golden_compensator(root=ROOTS[name]), DIGEST, interface)
 
 
 def code_of(text):
@@ -58,7 +55,7 @@ def test_names_are_others_whatever_the_case_and_none_is_a_word_of_the_standard_o
 @pytest.mark.parametrize("interface", ["plc", "codes"])
 @pytest.mark.parametrize("name", ["one solenoid", "two solenoids", *VARIANTS])
 def test_it_is_of_the_standards_grammar(name, interface):
-    made = compensator_of(ROOTS[name]) if name in ROOTS else variant(name)
+    made = golden_compensator(root=ROOTS[name]) if name in ROOTS else variant(name)
     grammar().parse(structured_text(made, DIGEST, interface))
 
 
@@ -82,20 +79,15 @@ def test_it_is_of_the_standards_grammar(name, interface):
     ],
 )
 def test_a_fault_is_refused_by_the_grammar(old, new):
-    text = structured_text(compensator_of(GOLDENS), DIGEST, "codes")
+    text = structured_text(golden_compensator(), DIGEST, "codes")
     assert old in text
     with pytest.raises(LarkError):
         grammar().parse(text.replace(old, new))
 
 
-def test_control_structures_that_end_with_a_semicolon_are_of_the_grammar():
-    text = structured_text(compensator_of(GOLDENS), DIGEST, "codes")
-    ended = "IF valid THEN drive := 0; ELSIF sound THEN drive := 1; ELSE drive := 2; END_IF;\ndrive := MIN"
-    grammar().parse(text.replace("drive := MIN", ended))
-
-
 def output(root, dialect, interface):
-    return generate_output(compensator_of(root), "iec61131", {"dialect": dialect, "interface": interface}).files
+    settings = {"dialect": dialect, "interface": interface}
+    return generate_output(golden_compensator(root=root), "iec61131", settings).files
 
 
 def plcopen_text(content):
@@ -119,7 +111,7 @@ def test_the_files_of_a_dialect_hold_the_same_text_and_are_the_same_bytes_again(
 
 def test_plcopen_declares_every_variable_with_its_type():
     namespace = "{http://www.plcopen.org/xml/tc6_0200}"
-    project = ElementTree.fromstring(output(GOLDENS_FULL, "codesys", "plc")["FB_DeadZone.xml"])
+    project = ElementTree.fromstring(output(FULL, "codesys", "plc")["FB_DeadZone.xml"])
     interface = next(project.iter(f"{namespace}interface"))
     sections = [(each.tag.removeprefix(namespace), each.get("constant")) for each in interface]
     assert sections == [("inputVars", None), ("outputVars", None), ("localVars", None), ("localVars", "true")]
@@ -128,44 +120,22 @@ def test_plcopen_declares_every_variable_with_its_type():
 
 
 def test_what_a_block_leaves_out_is_said():
-    both = compensator_of(GOLDENS_FULL)
+    both = golden_compensator(root=FULL)
     assert all(name in note_of(both, {}) for name in ("dither", "ramps", "debouncing", "latching", "interlock"))
     assert "dither" in structured_text(both, DIGEST, "plc")
 
 
 def test_current_control_is_refused(wording):
-    made = with_current(compensator_of(GOLDENS), target_named("f28335"), SENSORS["supply unknown"])
+    made = with_current(golden_compensator(), target_named("f28335"), SENSORS["supply unknown"])
     with wording.refusal(InputError):
         output_files(made, None, {"dialect": "codesys", "interface": "plc"})
 
 
 def test_a_law_that_needs_more_than_32_bits_is_refused(wording):
-    made = compensator_of(GOLDENS)
+    made = golden_compensator()
     signals = replace(made.signals, compare_max=65521)
     with wording.refusal(InputError):
         block_form(replace(made, signals=signals, beta_denominator=2**23), "codes")
-
-
-@pytest.mark.parametrize(
-    "options",
-    [
-        "--target iec61131 --interface bar",
-        "--target iec61131 --vectors 4000",
-        "--target f28335 --dialect twincat",
-        "--target iec61130",
-    ],
-)
-def test_a_wrong_option_writes_nothing(options, example_compensator_file, tmp_path, capsys, wording):
-    assert main(["codegen", str(example_compensator_file), *options.split(), "-o", str(tmp_path / "plc")]) == 2
-    wording.of_test(capsys.readouterr().err)
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.fixture(scope="module")
-def example_compensator_file(example_compensator, tmp_path_factory):
-    path = tmp_path_factory.mktemp("compensator") / "compensator.json"
-    path.write_bytes(to_json_bytes(example_compensator))
-    return path
 
 
 def test_settings_are_the_defaults_where_none_were_given():

@@ -21,24 +21,33 @@ from dzdesign.codegen.telemetry.frame import (
     crc_of,
 )
 from dzdesign.core.errors import InputError
-from tests.support.f28335_device import COMPILER, HERE, build, needs_compiler, render_firmware, run
+from tests.support.attacked_firmware import edit
+from tests.support.c2000_devices import MODEL, compiled, run, texts_of, write
+from tests.support.f28335_device import HERE, needs_compiler
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wpedantic", "-Werror")
-ORIGIN = 0x1234  # of f28335_device.render_firmware
+ORIGIN = 0x1234  # of c2000_devices.texts_of
 
 
 @pytest.fixture
 def firmware(tmp_path):
-    return render_firmware(tmp_path)
+    """The folder of the target's generated files, for a test to edit them."""
+    write(texts_of("f28335"), tmp_path)
+    return tmp_path
+
+
+def built(folder: Path, *options: str) -> Path:
+    """Compile the generated C with the model of the device."""
+    ours = [folder / name for name in ("dz_hardware.c", "dz_isr.c", "dz_telemetry.c", "dz_frame.c")]
+    model = [HERE / name for name in MODEL["f28335"]]
+    compiled(*options, f"-I{folder}", f"-I{HERE}", *ours, *model, "-lm", "-o", folder / "driver")
+    return folder / "driver"
 
 
 def frames_program(firmware) -> Path:
     """The generated frame code with a main() that writes what the lines of its stdin say."""
-    folder = firmware["f28335/dz_frame.c"].parent
-    program = folder / "frames"
-    sources = [str(folder / "dz_frame.c"), str(HERE / "frames.c")]
-    done = subprocess.run([COMPILER, *STRICT, f"-I{folder}", *sources, "-o", program], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    program = firmware / "frames"
+    compiled(f"-I{firmware}", firmware / "dz_frame.c", HERE / "frames.c", "-o", program)
     return program
 
 
@@ -137,7 +146,7 @@ def check_blocked_line(program: Path) -> None:
 @needs_compiler
 @pytest.mark.parametrize("check", [check_stream, check_blocked_line])
 def test_telemetry_on_the_device_model(firmware, check):
-    check(build(firmware))
+    check(built(firmware))
 
 
 @pytest.mark.slow
@@ -156,29 +165,22 @@ def test_telemetry_on_the_device_model(firmware, check):
     ],
 )
 def test_a_seeded_fault_of_the_telemetry_is_caught(firmware, old, new, check):
-    seed(firmware, old, new)
-    program = build(firmware, "-Wno-conversion")
+    edit(firmware, "dz_telemetry.c", old, new)
+    program = built(firmware, "-Wno-conversion")
     with pytest.raises(AssertionError):
         check(program)
 
 
-def seed(firmware, old: str, new: str) -> None:
-    source = firmware["f28335/dz_telemetry.c"]
-    before, found, after = source.read_text(encoding="utf-8").partition(old)
-    assert found, old
-    source.write_text(before + new + after, encoding="utf-8")
-
-
 def preempted_frames(firmware) -> list[Frame]:
     """Frames of the main loop with the interrupt just before each of its looks at the state, and without it."""
-    source = firmware["f28335/dz_telemetry.c"]
+    source = firmware / "dz_telemetry.c"
     text = source.read_text(encoding="utf-8")
     looks = text.count("dz_state.")
     assert looks >= 9
     text = text.replace("dz_state.", "device_state()->")
     text = text.replace("static uint16_t read_state", "volatile struct dz_state *device_state(void);\n$&", 1)
     source.write_text(text.replace("$&", "static uint16_t read_state"), encoding="utf-8")
-    program = build(firmware)
+    program = built(firmware)
     return [f for look in range(2 * looks) for f in read(bytes.fromhex(preempted(program, look)))[0]]
 
 
@@ -201,7 +203,8 @@ def test_a_frame_is_of_one_moment_wherever_the_interrupt_comes(firmware):
 @pytest.mark.slow
 @needs_compiler
 def test_a_state_read_once_is_torn(firmware):
-    seed(firmware, "(dz_state.ticks == copy->ticks) ? 1u : 0u", "(dz_state.ticks == copy->ticks) ? 1u : 1u")
+    edit(firmware, "dz_telemetry.c", "(dz_state.ticks == copy->ticks) ? 1u : 0u",
+         "(dz_state.ticks == copy->ticks) ? 1u : 1u")
     assert torn(preempted_frames(firmware))
 
 
@@ -225,7 +228,7 @@ needs_avr = pytest.mark.skipif(
 
 @needs_avr
 def test_a_pass_costs_what_is_stated_and_packs_the_same_where_int_has_16_bits(firmware, example_firmware, tmp_path):
-    folder = firmware["f28335/dz_frame.c"].parent
+    folder = firmware
     core = tmp_path / "core"
     core.mkdir()
     for name in ("dz_comp.c", "dz_comp.h", "dz_calibration.h", "dz_valve.h", "dz_drive.h"):

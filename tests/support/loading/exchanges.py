@@ -40,8 +40,6 @@ class Bench:
 
     drive: Drive
     good: Sequence[bytes]
-    #: Blocks that dz_calibration_check() refuses, though their CRC may be right.
-    bad: Sequence[bytes]
     old: bytes
     ends: Counter = field(default_factory=Counter)
     invalid_accepted: int = 0
@@ -49,11 +47,6 @@ class Bench:
     wrongly_done: int = 0
     stuck: int = 0
     used_unheld: int = 0
-
-    @property
-    def violations(self) -> int:
-        """Return how often something happened that must not."""
-        return self.invalid_accepted + self.old_lost + self.wrongly_done + self.stuck + self.used_unheld
 
     @property
     def words_of_a_load(self) -> int:
@@ -134,18 +127,6 @@ def frames_out_of_order(bench: Bench, rng: random.Random, new: bytes) -> str:
     return load(_session(bench, rng, faults(), faults()), new)
 
 
-def supply_lost_at_an_octet(bench: Bench, rng: random.Random, new: bytes) -> str:
-    """The drive dies as an octet comes."""
-    bench.drive.set(octets_left=rng.randrange(2 * len(new)))
-    return load(_session(bench, rng), new)
-
-
-def supply_lost_at_a_word(bench: Bench, rng: random.Random, new: bytes) -> str:
-    """The drive dies as a word is erased or written, and some bits of it have changed."""
-    bench.drive.set(words_left=rng.randrange(bench.words_of_a_load + 1))
-    return load(_session(bench, rng), new)
-
-
 def supply_lost_in_a_second_load(bench: Bench, rng: random.Random, new: bytes) -> str:
     """After a load without a restart: the block of the first one is the old one now."""
     first = rng.choice([block for block in bench.good if block not in (bench.old, new)])
@@ -179,24 +160,6 @@ def drive_in_use(bench: Bench, rng: random.Random, new: bytes) -> str:
             super().write(octets)
 
     return load(LoadSession(MovingLine(bench.drive), rng.randrange(256)), new)
-
-
-def bad_block(bench: Bench, rng: random.Random, new: bytes) -> str:
-    """A sender that keeps to the protocol, and a block, length or announcement that is wrong."""
-    case, session = rng.randrange(5), _session(bench, rng)
-    if case == 0:
-        ended = load(session, rng.choice(bench.bad))
-    elif case == 1:
-        at = 8 * rng.randrange(len(new) - 4) + rng.randrange(8)
-        flipped = (int.from_bytes(new, "little") ^ 1 << at).to_bytes(len(new), "little")
-        ended = load(session, flipped, origin=origin_of_block(new))
-    elif case == 2:
-        ended = load(session, new, crc=rng.randrange(1 << 32))
-    elif case == 3:
-        ended = load(session, new, origin=rng.randrange(1 << 32))
-    else:
-        ended = load(session, new[: 2 * rng.randrange(1, len(new) // 2)])
-    return f"{ended}, wrongly" if ended == "done" else ended
 
 
 def hostile_frames(bench: Bench, rng: random.Random, new: bytes) -> str:
@@ -241,11 +204,8 @@ def any_frame(rng: random.Random, words: int) -> Frame:
 KINDS = (
     noisy_line,
     frames_out_of_order,
-    supply_lost_at_an_octet,
-    supply_lost_at_a_word,
     supply_lost_in_a_second_load,
     sender_lost,
     drive_in_use,
-    bad_block,
     hostile_frames,
 )

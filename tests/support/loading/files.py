@@ -64,7 +64,7 @@ def bench_of(library: Path) -> Bench:
     drive.erase()
     drive.link(blocks()[0])
     drive.power_on()
-    return Bench(drive, blocks(), refused_blocks(), blocks()[0])
+    return Bench(drive, blocks(), blocks()[0])
 
 
 def new_bench(folder: Path, files: dict[str, str] | None = None, *options: str) -> Bench:

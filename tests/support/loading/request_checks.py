@@ -17,7 +17,7 @@ from dzdesign.codegen.loading.protocol import (
 )
 from tests.support.loading.bench import TICK_HZ, Drive, session
 from tests.support.loading.exchanges import crc_of_block, load, origin_of_block
-from tests.support.loading.files import BLOCK_OCTETS, blocks
+from tests.support.loading.files import BLOCK_OCTETS, blocks, refused_blocks
 
 WORDS = BLOCK_OCTETS // 2
 OLD, NEW = blocks()[1:3]
@@ -139,14 +139,16 @@ def lengths_that_are_not_right(drive: Drive) -> None:
 
 
 def announcements_that_are_not_kept(drive: Drive) -> None:
-    for changes, commit_crc, reason in (
-        ({"crc": 1}, 1, Reason.CRC),
-        ({}, 1, Reason.CRC),
-        ({"origin": 1}, crc_of_block(NEW), Reason.ORIGIN),
+    refused = refused_blocks()[0]
+    for block, changes, commit_crc, reason in (
+        (NEW, {"crc": 1}, 1, Reason.CRC),
+        (NEW, {}, 1, Reason.CRC),
+        (NEW, {"origin": 1}, crc_of_block(NEW), Reason.ORIGIN),
+        (refused, {}, crc_of_block(refused), Reason.CHECK),
     ):
         sender = fresh(drive)
-        assert sender.begin(**changes).reason == Reason.DONE
-        sender.all_data()
+        assert sender.begin(block, **changes).reason == Reason.DONE
+        sender.all_data(block)
         assert sender.commit(commit_crc).reason == reason
         assert drive.block() == OLD == drive.power_on()
 

@@ -12,8 +12,9 @@ from dzdesign.verify.closed_loop.loop import ClosedLoop
 from dzdesign.verify.closed_loop.plant import COIL_RAD, LARGEST_DP_MPA, PWM_PERIOD_S, Plant
 from dzdesign.verify.closed_loop.scene import scenes_of
 from dzdesign.verify.toolchain.compiled_library import CompiledLibrary
+from tests.support.designs import CURRENT
 from tests.support.synthetic import needs_compiler
-from tests.verify.closed_loop.test_current_in_loop import TEXTS, scenes_at_ends
+from tests.verify.closed_loop.test_current_in_loop import scenes_at_ends
 
 SHORT_S = 0.3
 
@@ -76,7 +77,7 @@ def test_the_stand_in_agrees(scenes):
 @needs_compiler
 @pytest.mark.parametrize("given", [False, True], ids=["stand-in", "plant of equations"])
 def test_a_drive_by_current_agrees(given, example_valve, plant, tmp_path):
-    found = compare(Window.of(scenes_at_ends(example_valve, TEXTS, tmp_path, plant if given else None)[0], SHORT_S))
+    found = compare(Window.of(scenes_at_ends(example_valve, CURRENT, tmp_path, plant if given else None)[0], SHORT_S))
     assert found.q_largest_L_min > 1 and max(found.position_difference, found.flow_difference) < 5e-6
 
 

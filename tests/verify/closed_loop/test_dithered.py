@@ -19,8 +19,8 @@ from dzdesign.verify.closed_loop.plant import Plant, read_plant
 from dzdesign.verify.closed_loop.scenarios import run_scenarios
 from dzdesign.verify.closed_loop.scene import scenes_of
 from dzdesign.verify.closed_loop.simulated_recordings import Bench, simulated_files
+from tests.support.designs import designed, written
 from tests.support.synthetic import needs_compiler
-from tests.support.written_firmware import designed, written
 
 pytestmark = [needs_compiler, pytest.mark.slow]
 PRESSURES = (1.0, 3.0, 5.0)

@@ -21,9 +21,9 @@ from dzdesign.verify.closed_loop.scenarios import readings_off, run_scenarios, s
 from dzdesign.verify.closed_loop.scene import NO_CORE_CAN_KNOW, SETTLE_S, STEP_S, scenes_of
 from dzdesign.verify.closed_loop.stand_in import stand_in_of
 from dzdesign.verify.requirements import ZERO_FLOW
+from tests.support.designs import designed, written
 from tests.support.evidence import verify
 from tests.support.synthetic import Truth, needs_compiler, synthetic_ramp, with_side
-from tests.support.written_firmware import designed, written
 
 pytestmark = needs_compiler
 QUICK = RampSequence(rest=0.5, ramp=4.0, top=0.5)

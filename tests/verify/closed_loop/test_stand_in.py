@@ -16,9 +16,9 @@ from dzdesign.verify.closed_loop.loop_checks import no_flow_at_zero, plant_is_th
 from dzdesign.verify.closed_loop.ramps import compare_at_pressure
 from dzdesign.verify.closed_loop.stand_in import StandIn, stand_in_of
 from dzdesign.verify.toolchain.compiled_library import CompiledLibrary
+from tests.support.designs import designed, written
 from tests.support.evidence import pressure_result, verify
 from tests.support.synthetic import SHARED, Truth, needs_compiler, synthetic_ramp
-from tests.support.written_firmware import designed, written
 
 pytestmark = needs_compiler
 QUICK = RampSequence(rest=0.5, ramp=10.0, top=0.5)
@@ -358,12 +358,6 @@ def test_a_side_without_pressure_drops_has_no_stand_in(wording):
     ramp = replace(synthetic_ramp(1.0, Truth()), dp=None)
     with wording.refusal(InputError):
         stand_in_of(identify([ramp]).positive, 10.0)
-
-
-def test_recordings_at_several_pressures_have_load_steps(scenes, example_compensator):
-    dp = [test.dp_MPa for test in example_compensator.valve.positive.tests]
-    assert [scene.dp_MPa for scene in scenes] == dp
-    assert all(scene.tested_MPa == (dp[0], dp[-1]) for scene in scenes)
 
 
 @pytest.mark.slow

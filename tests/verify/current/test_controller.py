@@ -3,7 +3,6 @@
 import shutil
 import subprocess
 from dataclasses import replace
-from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -11,16 +10,11 @@ import pytest
 from dzdesign.core.artefact_types import RuleError
 from dzdesign.core.errors import RequirementError
 from dzdesign.verify.current.controller_states import (
-    COMPARED,
-    NO_OFFSET,
     OPEN,
     OVER,
-    SENSOR,
     SHORT,
     HostStates,
     check_states,
-    exact_calibrations,
-    exact_ticks,
     hashes_on,
 )
 from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4
@@ -178,67 +172,6 @@ def test_misra_finds_nothing_that_is_not_stated(name, tmp_path):
     shown = [each for each in shown if each[1].endswith(("dz_current.c", "dz_current.h"))]
     stated = justified((tmp_path / "dz_current.h").read_text())
     assert [each for each in shown if (each[0].removeprefix("misra-c2012-"), symbol_of(each[2])) not in stated] == []
-
-
-class Exact:
-    """The exact controller, one state after another."""
-
-    def __init__(self, loop, **state):
-        self.loop, self.state = loop, {**dict.fromkeys(COMPARED, 0), "offset": loop.offset_nominal, **state}
-
-    def tick(self, set_point, total, supply_code=0):
-        given = self.state | {"set_point": set_point, "total": total, "supply_code": supply_code}
-        after = exact_ticks(self.loop, {name: np.array([value]) for name, value in given.items()})
-        self.state |= {name: int(values[0]) for name, values in after.items()}
-        return self.state
-
-
-def calibrated(above):
-    """Offset and faults after a calibration so many codes beside the nominal offset, with one sum too many."""
-    sums = np.full((1, (1 << PLAIN.offset_shift) + 1), PLAIN.offset_nominal + above)
-    offsets, faults = exact_calibrations(PLAIN, sums, np.array([NO_OFFSET]))
-    return int(offsets[0]), int(faults[0])
-
-
-def test_nothing_is_driven_before_the_offset_is_known_nor_with_one_beyond_its_tolerance():
-    beyond = PLAIN.offset_tolerance + 1
-    assert calibrated(0) == (PLAIN.offset_nominal, 0) and calibrated(beyond) == (PLAIN.offset_nominal + beyond, SENSOR)
-    for faults in (NO_OFFSET, SENSOR, 0):
-        after = Exact(PLAIN, faults=faults).tick(30000, PLAIN.offset_nominal)
-        assert after["faults"] == faults and (after["compare"] > 0) == (not faults)
-
-
-@pytest.mark.parametrize(
-    ("above", "ticks", "fault"),
-    [(PLAIN.over_sum, PLAIN.over_ticks, OVER), (0, PLAIN.open_ticks + 1, OPEN), (PLAIN.short_sum, 1, SHORT)],
-)
-def test_a_fault_latches_after_its_periods_in_a_row(above, ticks, fault):
-    controller = Exact(PLAIN)
-    for _ in range(ticks):
-        assert controller.state["faults"] == 0
-        controller.tick(30000, PLAIN.offset_nominal + above)
-    for _ in range(2):
-        assert [controller.state[name] for name in ("compare", "faults", "integral")] == [0, fault, 0]
-        controller.tick(30000, PLAIN.offset_nominal + 9000)
-
-
-def test_a_wound_up_integral_leaves_the_end_at_once():
-    """At the output's end the integral stands, so that the first error of the other sign takes the output back."""
-    controller = Exact(replace(PLAIN, open_ticks=65535))
-    for _ in range(1000):
-        controller.tick(60000, PLAIN.offset_nominal)
-    assert controller.state["compare"] == PLAIN.compare_limit
-    assert controller.state["integral"] < PLAIN.compare_limit << PLAIN.gain_shift
-    assert controller.tick(60000, PLAIN.offset_nominal + 25000)["compare"] < PLAIN.compare_limit
-
-
-def test_the_supply_scales_the_output():
-    low, middle, high, below, above = (
-        Exact(LOOPS["supply"], ramped=30000).tick(30000, PLAIN.offset_nominal + 8000, code)["compare"]
-        for code in (1638, 2457, 3276, 100, 4095)
-    )
-    assert Fraction(low, high) == pytest.approx(2, rel=1e-3) and Fraction(low, middle) == pytest.approx(1.5, rel=1e-3)
-    assert (below, above) == (low, high)
 
 
 @pytest.mark.parametrize(

@@ -15,12 +15,11 @@ from dzdesign.verify.current.corner_runs import CURRENTS, stability_margins
 from dzdesign.verify.current.current_checks import current_checks
 from dzdesign.verify.exhaustive import machine_code
 from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4
-from tests.codegen.test_current_control import MEASURED, TEXTS
 from tests.support.current_loops import current_texts
+from tests.support.designs import CURRENT, MEASURED, designed, replaced, written
 from tests.support.evidence import verify
 from tests.support.example_coil import COIL, CONVERTER, SAMPLING, SENSORS, asked, example_loop
 from tests.support.synthetic import needs_compiler
-from tests.support.written_firmware import designed, replaced, written
 
 pytestmark = needs_compiler
 #: Fewer than `verify` compares, where a fault is a common one.
@@ -35,7 +34,7 @@ def silent(_: str) -> None:
 @pytest.fixture(scope="module")
 def controlled(example_valve):
     """The example's compensator with current control, the supply not measured."""
-    return designed(example_valve, "cortex-m4", **TEXTS)
+    return designed(example_valve, "cortex-m4", **CURRENT)
 
 
 @pytest.fixture(autouse=True)
@@ -219,7 +218,7 @@ def test_a_set_point_that_the_supply_cannot_carry_is_said(controlled, tmp_path):
 
 @pytest.mark.parametrize("kept", ["what the coil makes", "the set point's peak alone"])
 def test_a_dither_that_the_current_overshoots_is_kept_free_or_seen(kept, example_valve, tmp_path):
-    made = designed(example_valve, "cortex-m4", **TEXTS, dither="150 Hz 1 %")
+    made = designed(example_valve, "cortex-m4", **CURRENT, dither="150 Hz 1 %")
     if kept == "the set point's peak alone":
         made = replace(made, current_drive=replace(made.current_drive, dither_above_counts=0))
     found = current_checks(firmware_of(made, tmp_path / "firmware"), made, silent, STATES)

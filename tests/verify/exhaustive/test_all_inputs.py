@@ -1,15 +1,16 @@
 """The check of every input is checked: each count fires on a core that has just that fault, on every machine."""
 
 import re
-import shutil
 import subprocess
 from dataclasses import replace
 from fractions import Fraction
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from dzdesign.core.errors import RequirementError
+from dzdesign.verify.exhaustive import machine_code
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs, first_wrong, input_check
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.machine_code import check_on_machine, machine_code_checks
@@ -29,8 +30,8 @@ from dzdesign.verify.folder import read_compensator
 from dzdesign.verify.toolchain import machines
 from dzdesign.verify.toolchain.compiled_core import COUNTED, CompiledCore, Findings
 from dzdesign.verify.toolchain.host_compiler import host_compiler
-from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4
-from tests.support.golden_firmware import FULL, GOLDENS, INPUT, generated, write
+from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4, Machine
+from tests.support.golden_firmware import FULL, golden_folder
 from tests.support.synthetic import needs_compiler
 
 pytestmark = needs_compiler
@@ -42,21 +43,15 @@ def needs(machine):
     return pytest.mark.skipif(bool(machine.missing()), reason=f"{machine.name}: {machine.missing()}")
 
 
-def copy_of(root, target: str, folder):
-    write(folder, generated(target, root))
-    shutil.copy(root / INPUT, folder / INPUT)
-    return folder
-
-
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory):
-    return copy_of(GOLDENS, "f28335", tmp_path_factory.mktemp("plain") / "fw")
+    return golden_folder("f28335", tmp_path_factory.mktemp("plain") / "fw")
 
 
 @pytest.fixture(scope="module")
 def full(tmp_path_factory):
     """Both signs, unlike sensors with live zeros, swapped pressures, an edge."""
-    return copy_of(FULL, "f28335", tmp_path_factory.mktemp("full") / "fw")
+    return golden_folder("f28335", tmp_path_factory.mktemp("full") / "fw", FULL)
 
 
 def exact_law(folder, sign: int = 1) -> ExactLaw:
@@ -225,30 +220,6 @@ def test_the_pressure_drops_of_a_difference_are_the_extremes_over_its_pairs(full
         assert most[place] / scale == pytest.approx(drops.max() + ends[1], abs=1e-9)
 
 
-@pytest.mark.slow
-def test_the_steps_of_the_c_are_the_rows_of_the_reference(full):
-    """The C's quotients and remainders against the law in fractions, command by command."""
-    for sign in (1, -1):
-        exact = exact_law(full, sign)
-        prepared = PreparedInputs(exact)
-        corners = [exact.corners(exact.betas(int(code))) for code in prepared.differences.values[::501]]
-        laws, rows_of = prepared._laws(), prepared._rows()["law"][::501]
-        for ends, law in zip(corners, rows_of, strict=True):
-            values, begin = [], 0
-            for part, straight in enumerate(prepared._parts):
-                piece = laws[law, part]
-                for k in range(straight.end - begin):
-                    total = int(piece["remainder"]) + k * int(piece["carry"])
-                    count = int(piece["quotient"]) + k * int(piece["step"]) + total // straight.denominator
-                    values.append(min(max(count, 0), exact.compare_limit))
-                begin = straight.end
-            for code in range(exact.code_max + 1):
-                place = code if sign > 0 else exact.code_max - code
-                assert values[place] == (
-                    exact.compare_value(code, ends) if code in exact.sound_commands else 0
-                )
-
-
 def test_a_sample_has_the_corners(plain):
     prepared = PreparedInputs(exact_law(plain))
     chosen = prepared.differences.values[prepared.sampled_rows()].tolist()
@@ -264,7 +235,7 @@ def test_a_sample_has_the_corners(plain):
 @needs(CORTEX_M4)
 @pytest.mark.parametrize("sign", [1, -1])
 def test_the_machine_code_of_the_cortex_m4_gives_what_the_host_gives_at_every_input(sign, tmp_path):
-    folder = copy_of(FULL, "cortex-m4", tmp_path / "fw")
+    folder = golden_folder("cortex-m4", tmp_path / "fw", FULL)
     host = check_all_inputs(folder, sign)
     done = check_on_machine(folder, CORTEX_M4, host)
     assert done.holds and done.found.inputs == host.inputs and done.found.outputs_hash == host.outputs_hash
@@ -273,7 +244,7 @@ def test_the_machine_code_of_the_cortex_m4_gives_what_the_host_gives_at_every_in
 @pytest.mark.slow
 @needs(AVR)
 def test_the_machine_code_of_the_avr_gives_what_the_host_gives_at_the_sample(tmp_path):
-    folder = copy_of(GOLDENS, "host", tmp_path / "fw")
+    folder = golden_folder("host", tmp_path / "fw")
     done = check_on_machine(folder, AVR, check_all_inputs(folder))
     assert done.holds and done.found.inputs > 5000
 
@@ -282,7 +253,7 @@ def test_the_machine_code_of_the_avr_gives_what_the_host_gives_at_the_sample(tmp
 @needs(AVR)
 def test_an_int_of_16_bits_is_seen_on_the_avr_alone(tmp_path):
     """A product that needs a longer int, which no PC shows."""
-    folder = copy_of(GOLDENS, "host", tmp_path / "fw")
+    folder = golden_folder("host", tmp_path / "fw")
     core = folder / "core" / "dz_comp.c"
     text, count = re.subn(r"pressure_difference\(block, p_a_adc,",
                           "pressure_difference(block, (uint16_t)((p_a_adc * 17) / 17),", core.read_text())  # fmt: skip
@@ -311,3 +282,18 @@ def input_check_of(folder):
     at_zero = np.zeros(prepared.differences.values.size, dtype=int)
     found = Findings(outputs_hash="", object_sha256="", at_zero=at_zero, **dict.fromkeys(COUNTED, 0))
     return input_check(prepared, CompiledCore(folder).sha256, found)
+
+
+@pytest.mark.parametrize(
+    ("target", "tried"), [("cortex-m4", ["Cortex-M4"]), ("f28335", ["Cortex-M4", "AVR"])]
+)
+def test_without_tools_the_targets_own_machine_alone_is_required(tmp_path, monkeypatch, target, tried):
+    monkeypatch.setattr(machine_code, "read_compensator", lambda _: SimpleNamespace(current_drive=None))
+    monkeypatch.setattr(machine_code, "read_firmware_manifest", lambda _: SimpleNamespace(target=target))
+    monkeypatch.setattr(Machine, "missing", lambda _: "no tools")
+    (tmp_path / "manifest.json").touch()
+    checks = machine_code.machine_code_checks(tmp_path, inputs=())
+    assert [check.name.removeprefix("machine code of the ") for check in checks] == tried
+    assert all(check.holds is None for check in checks)
+    monkeypatch.setattr(Machine, "missing", lambda _: "")
+    assert len(machine_code.machine_code_checks(tmp_path, inputs=())) == 2, "others are tried where they can be"

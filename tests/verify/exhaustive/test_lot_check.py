@@ -124,12 +124,6 @@ def test_the_file_holds_every_valve(document, common, batch):
     prove_derived(read(document))
 
 
-@pytest.mark.parametrize("key", ["lot", "lot_sha256"])
-def test_half_of_the_lot_is_refused(document, key, wording):
-    with wording.refusal(InputError):
-        read({name: value for name, value in document.items() if name != key})
-
-
 def test_a_bound_that_somebody_raised_is_refused(document, wording):
     lot = json.loads(json.dumps(document["lot"]))
     lot[2]["positive"]["u_lower_V"][0] += 0.1

@@ -5,31 +5,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dzdesign.codegen.project import target_named
-from dzdesign.core.artefact_reading import read_artefact
-from dzdesign.design.designing import design
-from dzdesign.design.options import options_of
 from dzdesign.identify.reading.ramp_test import RampTest
-from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.recorded_drop import DropColumns
 from dzdesign.verify.exhaustive.recorded_inputs import recorded_inputs_follow
-from tests.support.golden_firmware import FULL
+from tests.support.designs import BOTH_SIGNS, designed
+from tests.support.golden_firmware import FULL, golden_valve
 
 AB = DropColumns(quantities=("pA", "pB"), labels=("Druck A", "Druck B"))
 DP = DropColumns(quantities=("dP",), labels=("dP",))
 P_A, P_B = (DropColumns(quantities=("pP", port), labels=("Druck P", f"Druck {port[1]}")) for port in ("pA", "pB"))
 
 
-@pytest.fixture(scope="module")
-def valve():
-    return read_artefact((FULL / "valve.json").read_bytes(), ValveModel, "valve.json")
-
-
-def designed(valve, choice, **texts):
+def declared(choice):
     """Return a compensator whose direction is declared, of a valve that says nothing of it."""
+    valve = golden_valve(FULL)
     silent = replace(valve, sides={name: replace(side, recorded_drop=None) for name, side in valve.sides.items()})
-    given = {"command_signal": "-10..10 V x 0.15 + 1.5 V", "negative_dp": choice} | texts
-    return design(silent, options_of(given, target_named("f28335").inputs()))
+    return designed(silent, command_signal=BOTH_SIGNS, negative_dp=choice)
 
 
 def recorded(*, sign, columns=(AB, AB)):
@@ -47,30 +38,30 @@ def recorded(*, sign, columns=(AB, AB)):
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("choice", ["same", "swapped"])
 @pytest.mark.parametrize("columns", [AB, DP], ids=["two sensors", "signed dP"])
-def test_only_the_recorded_direction_is_read(valve, sign, choice, columns):
-    compensator = designed(valve, choice)
+def test_only_the_recorded_direction_is_read(sign, choice, columns):
+    compensator = declared(choice)
     check = recorded_inputs_follow(compensator, recorded(sign=sign, columns=(columns,) * 2))
     magnitude = choice == "swapped" and columns is DP and sign > 0
     assert check.holds is ((choice == "swapped") == (sign < 0) or magnitude)
     assert ("taken as declared" in check.text) is magnitude
 
 
-def test_a_permanent_fault_is_said_of_its_recording(valve, wording):
-    compensator = designed(valve, "same")
+def test_a_permanent_fault_is_said_of_its_recording(wording):
+    compensator = declared("same")
     check = recorded_inputs_follow(compensator, recorded(sign=-1))
     wording.of_test(check.text)
 
 
 @pytest.mark.parametrize("choice", ["same", "swapped"])
-def test_three_sensors_are_no_pair(valve, choice, wording):
-    compensator = designed(valve, choice)
+def test_three_sensors_are_no_pair(choice, wording):
+    compensator = declared(choice)
     check = recorded_inputs_follow(compensator, recorded(sign=1, columns=(P_A, P_B)))
     assert check.holds is False
     wording("recorded inputs: three sensors", check.text)
 
 
-def test_switched_inputs_are_the_machine_s(valve, wording):
-    compensator = designed(valve, "wired")
+def test_switched_inputs_are_the_machine_s(wording):
+    compensator = declared("wired")
     check = recorded_inputs_follow(compensator, recorded(sign=1, columns=(P_A, P_B)))
     assert check.holds
     wording.of_test(check.text)

@@ -24,8 +24,8 @@ from dzdesign.verify.outputs.texts import (
     running,
 )
 from tests.support.core_variants import VARIANTS, variant
-from tests.support.octave import OCTAVE, compensator_of, needs_octave
-from tests.support.paths import GOLDENS, GOLDENS_FULL
+from tests.support.golden_firmware import FULL, golden_compensator
+from tests.support.octave import OCTAVE, needs_octave
 from tests.support.synthetic import needs_compiler
 
 SETTINGS = {"iec61131": {"dialect": "twincat", "interface": "codes"}, "matlab": {}}
@@ -35,7 +35,7 @@ DESIGNS = ("no transition", "live zero", "inverted", "bipolar, all options")
 
 @pytest.fixture(scope="module")
 def outputs():
-    made = compensator_of(GOLDENS)
+    made = golden_compensator()
     return {target: generate_output(made, target, settings) for target, settings in SETTINGS.items()}
 
 
@@ -157,42 +157,25 @@ def test_without_octave_the_function_is_not_checked(folder, monkeypatch):
     assert check.holds is None and "apt install octave" in check.text and found[f"core/dz_comp.c: {EXACT}"].holds
 
 
-@pytest.fixture
-def octave_of(folder):
-    def tried(old, new):
-        edited(folder / "matlab" / "dz_comp.m", old, new)
-        checks = function_in_octave(folder / "matlab", 1, compensator_of(GOLDENS), available_octave()).checks
-        return {check.id: check for check in checks}
-
-    return tried
-
-
 @needs_octave
 @pytest.mark.parametrize(
-    ("old", "new", "missed"),
+    ("old", "new", "missed", "words"),
     [
-        ("HALF = int64(", "HALF = int64(2 * ", "exact-law"),
-        ("law_beta(failed) = LAW_LEAST", "law_beta(failed) = LAW_LEAST + 4096", "fallback"),
-        ("int64(b_failed) .* 4", "int64(b_failed) .* 2", "states"),
-        ("BETA_FACTOR = int64(", "BETA_FACTOR = int64(9", "states"),
+        ("HALF = int64(", "HALF = int64(2 * ", "exact-law", ""),
+        ("law_beta(failed) = LAW_LEAST", "law_beta(failed) = LAW_LEAST + 4096", "fallback", ""),
+        ("int64(b_failed) .* 4", "int64(b_failed) .* 2", "states", ""),
+        ("BETA_FACTOR = int64(", "BETA_FACTOR = int64(9", "states", ""),
+        # One that fails.
+        ("uint16(compare), shape", "uint32(compare), shape", "exact-law", "uint32"),
+        ("LAW_NODES(row + 1)", "LAW_NODES(row)", "exact-law", "LAW_NODES"),
+        ("    code = ", "    cod = ", "exact-law", "code"),
+        ("    % ---- the law ----", "    exit(0);", "exact-law", "ended before"),
     ],
 )
-def test_a_wrong_function_is_seen_in_octave(octave_of, old, new, missed):
-    assert octave_of(old, new)[missed].holds is False
-
-
-@needs_octave
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        ("uint16(compare), shape", "uint32(compare), shape", "uint32"),
-        ("LAW_NODES(row + 1)", "LAW_NODES(row)", "LAW_NODES"),
-        ("    code = ", "    cod = ", "code"),
-        ("    % ---- the law ----", "    exit(0);", "ended before"),
-    ],
-)
-def test_a_function_that_fails_in_octave_does_not_hold(octave_of, old, new, words):
-    check = octave_of(old, new)["exact-law"]
+def test_a_wrong_function_is_seen_in_octave(folder, old, new, missed, words):
+    edited(folder / "matlab" / "dz_comp.m", old, new)
+    checks = function_in_octave(folder / "matlab", 1, golden_compensator(), available_octave()).checks
+    (check,) = [check for check in checks if check.id == missed]
     assert check.holds is False and words in check.text
 
 
@@ -236,7 +219,7 @@ def test_the_command_writes_the_evidence(example_compensator, tmp_path, capsys):
 
 
 def test_a_block_of_two_solenoids_keeps_the_bounds_of_both(tmp_path):
-    made = compensator_of(GOLDENS_FULL)
+    made = golden_compensator(root=FULL)
     settings = {"dialect": "codesys", "interface": "plc"}
     write_generated(generate_output(made, "iec61131", settings), tmp_path / "iec61131")
     found = checks_of(tmp_path, "iec61131")

@@ -1,4 +1,4 @@
-"""Blocks of many designs against the exact law, and wrong ones that must be caught. On few inputs."""
+"""Blocks of many designs against the exact law, wrong ones, and what their text means. On few inputs."""
 
 import re
 from fractions import Fraction
@@ -8,17 +8,15 @@ import pytest
 
 from dzdesign.codegen.integers.plc import structured_text
 from dzdesign.core.errors import RequirementError
-from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.outputs.every_pair import EveryPair
 from dzdesign.verify.outputs.exact_block import ExactBlock
 from dzdesign.verify.outputs.text_values import Overflow, TextValues
 from tests.support.core_variants import variant
-from tests.support.octave import compensator_of
-from tests.support.paths import GOLDENS, GOLDENS_FULL
+from tests.support.golden_firmware import FULL, GOLDENS, golden_compensator
 
 #: Pressure drops of a quick check, and of pressures at zero command every which; `verify` tries all.
 SOME, STEP = {"plc": range(-60, 2400, 211), "codes": range(-40, 3300, 97)}, 701
-ROOTS = {"one": GOLDENS, "two": GOLDENS_FULL}
+ROOTS = {"one": GOLDENS, "two": FULL}
 DESIGNS = ("no transition", "target law, no transition", "live zero", "inverted", "bipolar, no transition",
            "bipolar, all options")  # fmt: skip
 COUNTS = ("wrong", "wrong_status", "wrong_state")
@@ -43,7 +41,7 @@ def is_right(found):
 @pytest.fixture(scope="module", params=[(root, kind) for root in ROOTS for kind in SOME], ids=" ".join)
 def case(request):
     root, interface = request.param
-    made = compensator_of(ROOTS[root])
+    made = golden_compensator(root=ROOTS[root])
     return made, EveryPair(made, interface, made.signals.signs, remembers=True), interface
 
 
@@ -65,30 +63,9 @@ def test_the_block_of_another_design(name, interface):
     assert is_right(found_of(EveryPair(made, interface, made.signals.signs, remembers=True), of_block(text)))
 
 
-def test_rows_made_by_additions_are_the_exact_law(case):
-    """What the check compares with, against the law at single codes, computed each by itself."""
-    made, every, interface = case
-    random = np.random.default_rng(3)
-    for law in every.laws:
-        exact = law.exact
-        rows = np.array([0, 1, exact.reverse, exact.reverse + 300, len(law.table) - 1])
-        outputs = law.outputs(rows)
-        for row, column in zip(rows, outputs.T, strict=True):
-            last = row == len(law.table) - 1
-            corners = exact.corners(exact.least_betas() if last else exact.betas_at(int(row) - exact.reverse))
-            for away in [0, exact.zero_band, exact.transition_end, exact.span, *random.integers(0, exact.span, 20)]:
-                part = next(place for place in range(len(corners) - 1) if away <= corners[place + 1][0])
-                (begin, start), (end, stop) = corners[part : part + 2]
-                value = start + (stop - start) * Fraction(int(away) - begin, end - begin) if end > begin else start
-                assert column[away] == min(max((value + exact.rounding).__floor__(), 0), exact.compare_limit)
-                if interface == "codes":
-                    code = exact.zero + exact.along * int(away)
-                    assert column[away] == ExactLaw(made, exact.sign).compare_value(code, corners)
-
-
 def test_in_units_of_a_plc_the_law_is_that_of_the_share_of_full_command():
     """By hand: full command at no pressure drop, beta of the next code outside, rounded down."""
-    made = compensator_of(GOLDENS)
+    made = golden_compensator()
     exact, side = ExactBlock(made, 1, "plc"), made.side(1)
     beta = made.law_beta(int(-(-Fraction(1, 100) // made.signals.pressure_a.per_code_MPa)))
     full = beta * side.u_min0_over_u_max + beta * (side.drive_range_over_u_max - 1) + 1  # Eq. (18) at full command
@@ -97,52 +74,45 @@ def test_in_units_of_a_plc_the_law_is_that_of_the_share_of_full_command():
     assert exact.betas_at(-exact.reverse - 1) == exact.least_betas()
 
 
-@pytest.fixture(scope="module")
-def one_plc():
-    made = compensator_of(GOLDENS)
-    return structured_text(made, "0" * 64, "plc"), EveryPair(made, "plc", (1,), remembers=True)
+@pytest.fixture(scope="module", params=ROOTS)
+def plc(request):
+    """The text of a block in units of a PLC, and what tries it."""
+    made = golden_compensator(root=ROOTS[request.param])
+    return structured_text(made, "0" * 64, "plc"), EveryPair(made, "plc", made.signals.signs, remembers=True)
 
 
-@pytest.fixture(scope="module")
-def two_plc():
-    made = compensator_of(GOLDENS_FULL)
-    return structured_text(made, "0" * 64, "plc"), EveryPair(made, "plc", (1, -1), remembers=True)
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "count"),
-    [
-        ("(MAX(difference, 0) + 1)", "(MAX(difference, 0) + 0)", "wrong"),  # the resolution of a pressure
-        ("* 16;", "* 32;", "wrong_status"),
-        ("at_rest AND towards <= LEAVE_ZERO", "at_rest AND towards < LEAVE_ZERO", "wrong_state"),
-        ("BOOL_TO_DINT(b_failed) * 4", "BOOL_TO_DINT(a_failed) * 4", "wrong_status"),
-        ("failed := NOT sound OR below", "failed := NOT sound", "wrong"),
-        ("quotient := ", "quotient := 80 + ", "wrong"),
-        ("SEL(valid, 0, drive)", "SEL(valid, drive, drive)", "wrong"),
-    ],
-)
-def test_a_seeded_fault_is_counted(one_plc, old, new, count):
-    text, every = one_plc
-    assert old in text
-    assert found_of(every, of_block(text.replace(old, new, 1)))[count] > 0
+of_one = pytest.mark.parametrize("plc", ["one"], indirect=True)
 
 
 @pytest.mark.parametrize(
-    ("old", "new"),
+    ("plc", "old", "new", "counts"),
     [
-        ("SEL(away > LEAVE_ZERO, SEL(away < -LEAVE_ZERO, side, -1), 1)", "SEL(away > 0, SEL(away < 0, side, -1), 1)"),
-        ("SEL(valid, 0, SEL(away", "SEL(valid, side, SEL(away"),
-        ("SEL(negative, difference, -difference)", "difference"),
-        ("output_b := SEL(negative, 0, drive)", "output_b := SEL(negative, 0, output_a)"),
-        ("negative := side < 0", "negative := away < 0"),
+        # The resolution of a pressure.
+        ("one", "(MAX(difference, 0) + 1)", "(MAX(difference, 0) + 0)", ["wrong"]),
+        ("one", "* 16;", "* 32;", ["wrong_status"]),
+        ("one", "at_rest AND towards <= LEAVE_ZERO", "at_rest AND towards < LEAVE_ZERO", ["wrong_state"]),
+        ("one", "BOOL_TO_DINT(b_failed) * 4", "BOOL_TO_DINT(a_failed) * 4", ["wrong_status"]),
+        ("one", "failed := NOT sound OR below", "failed := NOT sound", ["wrong"]),
+        ("one", "quotient := ", "quotient := 80 + ", ["wrong"]),
+        ("one", "SEL(valid, 0, drive)", "SEL(valid, drive, drive)", ["wrong"]),
+        # A block that mistakes its side.
+        ("two", "SEL(away > LEAVE_ZERO, SEL(away < -LEAVE_ZERO, side, -1), 1)",
+         "SEL(away > 0, SEL(away < 0, side, -1), 1)", COUNTS),
+        ("two", "SEL(valid, 0, SEL(away", "SEL(valid, side, SEL(away", COUNTS),
+        ("two", "SEL(negative, difference, -difference)", "difference", COUNTS),
+        ("two", "output_b := SEL(negative, 0, drive)", "output_b := SEL(negative, 0, output_a)", COUNTS),
+        ("two", "negative := side < 0", "negative := away < 0", COUNTS),
     ],
-)
-def test_a_block_that_mistakes_its_side_is_caught(two_plc, old, new):
-    text, every = two_plc
+    indirect=["plc"],
+)  # fmt: skip
+def test_a_seeded_fault_is_counted(plc, old, new, counts):
+    text, every = plc
     assert old in text
-    assert not is_right(found_of(every, of_block(text.replace(old, new, 1))))
+    found = found_of(every, of_block(text.replace(old, new, 1)))
+    assert any(found[count] > 0 for count in counts)
 
 
+@of_one
 @pytest.mark.parametrize(
     ("old", "new"),
     [
@@ -152,8 +122,8 @@ def test_a_block_that_mistakes_its_side_is_caught(two_plc, old, new):
         ("/ UNITS", "/ (UNITS - 1000)"),
     ],
 )
-def test_a_seeded_overflow_is_an_error_that_names_its_line(one_plc, old, new):
-    text, every = one_plc
+def test_a_seeded_overflow_is_an_error_that_names_its_line(plc, old, new):
+    text, every = plc
     assert text.count(old) >= 1
     line = next(number for number, row in enumerate(text.splitlines(), 1) if old in row)
     with pytest.raises(Overflow, match=rf"FB\.st, line ({line}|{line - 1}): "):
@@ -172,10 +142,11 @@ def mutants(text):
     return found
 
 
+@of_one
 @pytest.mark.slow
-def test_wrong_blocks_are_caught(one_plc):
+def test_wrong_blocks_are_caught(plc):
     """A change that no input tells apart is one of a clamp that the law never reaches: few are."""
-    text, every = one_plc
+    text, every = plc
     changed = mutants(text)
     assert len(changed) > 150
     left = []
@@ -188,3 +159,90 @@ def test_wrong_blocks_are_caught(one_plc):
         except RequirementError:
             continue
     assert len(left) <= 0.25 * len(changed[::14]), left
+
+
+BLOCK = """FUNCTION_BLOCK B
+VAR_INPUT
+    x, y : DINT; (* two numbers; the
+        first is x *)
+END_VAR
+VAR
+    seen : BOOL := TRUE;
+    z : DINT;
+END_VAR
+VAR CONSTANT
+    C : DINT := -7; T : ARRAY[0..2] OF DINT := [10, -20,
+        30];
+END_VAR
+{};
+END_FUNCTION_BLOCK
+"""
+ENDS = [-(2**31), 2**31 - 1, -65537, -65536, -8, -7, -1, 0, 1, 3, 7, 65535, 65536, 1_000_003]
+
+
+def block(statements):
+    return TextValues(BLOCK.format(statements), "B.st")
+
+
+def divided(x, y):
+    return abs(x) // y * (1 if x >= 0 else -1)
+
+
+#: Expression to its meaning for x, and y; None: it is a fault.
+MEANINGS = {
+    "x + y": lambda x, y: x + y,
+    "x - y * C": lambda x, y: x + 7 * y if abs(7 * y) < 2**31 else None,
+    "x * y": lambda x, y: x * y,
+    "-x": lambda x, y: -x,
+    "x / 65536": lambda x, y: divided(x, 65536),
+    "x / 7": lambda x, y: divided(x, 7),
+    "x / MAX(y, 3)": lambda x, y: divided(x, max(y, 3)),
+    "x MOD 32768": lambda x, y: x - divided(x, 32768) * 32768,
+    "x MOD 7 + C": lambda x, y: x - divided(x, 7) * 7 - 7,
+    "x / y": lambda x, y: divided(x, y) if y > 0 else None,
+    "MIN(x, MAX(y, C))": lambda x, y: min(x, max(y, -7)),
+    "T[MIN(MAX(x, 0), 2)]": lambda x, y: (10, -20, 30)[min(max(x, 0), 2)],
+    "T[x]": lambda x, y: {0: 10, 1: -20, 2: 30}.get(x),
+    "SEL(x < y AND NOT (x = 3), C, x)": lambda x, y: x if x < y and x != 3 else -7,
+    "BOOL_TO_DINT(x <= y OR x <> 7) * 8": lambda x, y: 8 * (x <= y or x != 7),
+}
+
+
+@pytest.mark.parametrize("expression", MEANINGS)
+def test_an_operation_means_what_the_language_says_and_a_fault_is_seen(expression):
+    text = block(f"z := {expression}")
+    for x in ENDS:
+        for y in ENDS:
+            must, given = MEANINGS[expression](x, y), {"x": np.array([x]), "y": np.array([y])}
+            if must is None or not -(2**31) <= must < 2**31:
+                with pytest.raises(Overflow, match=r"B\.st, line 14: z: "):
+                    text.run(given)
+            else:
+                assert int(text.run(given)["z"].flat[0]) == must, (x, y)
+
+
+def test_one_overflow_of_many_inputs_is_seen_and_ends_that_do_not_meet_are_none():
+    """The ends of x and y lie at different inputs: only a sum that occurs can overflow."""
+    x = np.array([2**31 - 1, -(2**31), 5])
+    assert block("z := x + y").run({"x": x, "y": -np.sign(x)})["z"].tolist() == [2**31 - 2, 1 - 2**31, 4]
+    with pytest.raises(Overflow, match="2147483648"):
+        block("z := x + y").run({"x": x, "y": np.array([1, 1, 1])})
+
+
+def test_what_is_remembered_and_inputs_that_broadcast():
+    text = block("seen := x < 0 OR seen AND x < 5;\n(* more *) z := SEL(seen, y, x)")
+    assert text.first == {"seen": "TRUE"}
+    found = text.run({"x": np.arange(-1, 7)[:, None], "y": np.arange(3),
+                      "seen": np.array(True)})  # fmt: skip
+    assert found["z"].shape == (8, 3) and found["seen"].shape == (8, 1) and found["seen"].sum() == 6
+
+
+@pytest.mark.parametrize(
+    "statements",
+    ["IF x > 0 THEN z := 1; END_IF", "z := x +", "z := EXPT(x, y)", "z := x < y + (x > y)", "z := w",
+     "z := x; z(2) := 1",
+     "z := 2 ** 3", "z := x // 2", "z := SEL(x, 1, 2)", "z := 1.5", "z := x; }", "seen := NOT x"],
+)  # fmt: skip
+def test_what_is_no_assignment_of_numbers_is_refused(statements):
+    with pytest.raises(RequirementError):
+        block(statements).run({"x": np.array([1]), "y": np.array([2])})

@@ -1,10 +1,13 @@
-"""`codegen` over the firmware of another design asks for `--replace`; design's warnings are said again."""
+"""`codegen` over the firmware of another design, or another kind of output, asks for `--replace` and says what goes."""
 
 import json
 from dataclasses import replace
 
 import pytest
 
+from dzdesign import api
+from dzdesign.codegen.fmu.files import note_of
+from dzdesign.codegen.other_targets import generate_output, settings_of
 from dzdesign.codegen.project import generate
 from dzdesign.codegen.writing import write_generated
 from dzdesign.command_line.cli import main
@@ -14,6 +17,7 @@ from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.documents import to_json
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
+from tests.support.golden_firmware import golden_valve
 from tests.support.paths import GOLDENS_FULL
 from tests.support.synthetic import with_side
 
@@ -115,3 +119,41 @@ def test_of_two_at_once_the_later_one_does_not_go_over_the_other(example_compens
     with pytest.raises(InputError, match="holds another firmware"):
         write_generated(ours, folder)
     assert json.loads((folder / "manifest.json").read_text())["files"] == dict(theirs.manifest.files)
+
+
+@pytest.fixture(scope="module")
+def compensator():
+    return api.design(golden_valve())
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch, compensator):
+    """Return what runs `codegen` in a folder with a function block in plc."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "compensator.json").write_bytes(to_json_bytes(compensator))
+    write_generated(generate_output(compensator, "iec61131", settings_of("iec61131", {})), tmp_path / "plc")
+    return lambda *words: main(["codegen", "compensator.json", "--target", *words, "-o", "plc"])
+
+
+@pytest.mark.parametrize("words", [("matlab",), ("amplifier", "--device", "west")], ids=" ".join)
+def test_another_kind_of_output_is_left_as_it_is(run, words, tmp_path, capsys, wording):
+    before = contents(tmp_path / "plc")
+    assert run(*words) == 2
+    assert contents(tmp_path / "plc") == before
+    wording(f"another kind of output: {' '.join(words)}", capsys.readouterr().err)
+
+
+def test_with_replace_it_is_written_over_and_said(run, tmp_path, capsys):
+    assert run("matlab", "--replace") == 0
+    assert not (tmp_path / "plc" / "FB_DeadZone.st").exists() and (tmp_path / "plc" / "dz_comp.m").is_file()
+    assert "what 'plc' held for iec61131 was replaced by this for matlab" in capsys.readouterr().err
+
+
+def test_the_same_kind_with_other_settings_is_written_again(run, tmp_path):
+    assert run("iec61131", "--dialect", "twincat") == 0
+    assert (tmp_path / "plc" / "FB_DeadZone.TcPOU").is_file()
+
+
+def test_fmus_without_a_plant_say_how_to_have_one(compensator):
+    assert "--plant PLANT.toml" in note_of(compensator, {"plant": ""})
+    assert note_of(compensator, {"plant": "{}"}) == ""
