@@ -11,7 +11,7 @@ from tests.support.paths import ROOT
 
 #: Of a room: lines of Python, files of Python, lines of templates, C programs, headers and tables.
 ROOM_SIZES = {
-    "core": (2790, 15, 0),
+    "core": (2775, 15, 0),
     "derivation": (4710, 28, 325),
     "identify": (18150, 130, 1100),
     "assess": (1690, 13, 0),
@@ -22,7 +22,7 @@ ROOM_SIZES = {
     "dzdesign": (10850, 91, 156),
 }
 #: Lines of Python of what is not shipped, and of the files that the tests compare with.
-TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 47951, 18000, 8930
+TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 47910, 18000, 8930
 #: Options of all commands together; an option of two commands counts twice.
 OPTIONS = 275
 #: What a number may be above what is there, before it is to be lowered.
