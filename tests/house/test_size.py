@@ -11,7 +11,7 @@ from tests.support.paths import ROOT
 
 #: Of a room: lines of Python, files of Python, lines of templates, C programs, headers and tables.
 ROOM_SIZES = {
-    "core": (2795, 15, 0),
+    "core": (2775, 15, 0),
     "derivation": (4710, 28, 325),
     "identify": (18037, 127, 1100),
     "assess": (1705, 13, 0),

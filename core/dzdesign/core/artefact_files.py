@@ -15,17 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from dzdesign.core.documents import MOST_DOCUMENT, family_of, json_object, reason_of, sha256_of, sha256_of_file, to_json
 from dzdesign.core.errors import InputError
-from dzdesign.core.placing import (
-    beside,
-    bring_back,
-    is_scratch,
-    make_folder,
-    put_in_place,
-    remove_abandoned,
-    sync_file,
-    sync_folder,
-    sync_tree,
-)
+from dzdesign.core.placing import beside, bring_back, is_scratch, make_folder, put_in_place, remove_abandoned
 from dzdesign.core.version import __version__
 
 if TYPE_CHECKING:
@@ -134,11 +124,7 @@ def _replace_file(path: Path, data: bytes) -> None:
     try:
         with open(temporary, "xb") as handle:
             handle.write(data)
-        if durable := not is_scratch(path):
-            sync_file(temporary)
-        os.replace(temporary, path)
-        if durable:
-            sync_folder(path.parent)
+        put_in_place(temporary, path)
     finally:  # an interrupt, too, leaves no half-written file behind
         with contextlib.suppress(OSError, ValueError):
             temporary.unlink(missing_ok=True)
@@ -300,14 +286,7 @@ def _replace_folder(folder: Path, contents: Mapping[str, bytes], filled_in: Iter
             for name in filled_in:
                 (staging / name).unlink()
             _carry_over(folder, staging, {MANIFEST_NAME, *old["files"]}.difference(filled_in))
-        if durable := not is_scratch(folder):
-            sync_tree(staging)
-        if folder.is_dir():
-            put_in_place(staging, folder)
-        else:
-            os.replace(staging, folder)
-            if durable:
-                sync_folder(folder.parent)
+        put_in_place(staging, folder)
     finally:
         shutil.rmtree(staging, ignore_errors=True)
 

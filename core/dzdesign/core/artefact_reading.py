@@ -208,23 +208,15 @@ def differences(stated: object, follows: object, *, rounding: float = 0.0, place
         for key in {**follows, **stated}:
             path = f"{place}.{key}" if place else key
             yield from differences(stated.get(key, NOTHING), follows.get(key, NOTHING), rounding=rounding, place=path)
-    elif _are_rows(stated, follows):
-        for index, (one, other) in enumerate(zip(stated, follows, strict=True)):  # type: ignore[call-overload]
+    elif isinstance(stated, list | tuple) and isinstance(follows, list | tuple) and len(stated) == len(follows):
+        for index, (one, other) in enumerate(zip(stated, follows, strict=True)):
             yield from differences(one, other, rounding=rounding, place=f"{place}[{index}]")
-    elif not _are_near(stated, follows, rounding):
+    elif not (
+        isinstance(stated, float)  # True and False are none
+        and isinstance(follows, float)
+        and math.isclose(stated, follows, rel_tol=rounding, abs_tol=rounding)
+    ):
         yield Difference(place=place, stated=stated, follows=follows)
-
-
-def _are_rows(stated: object, follows: object) -> bool:
-    rows = isinstance(stated, Sequence) and isinstance(follows, Sequence) and not isinstance(stated, str)
-    return rows and len(stated) == len(follows)  # type: ignore[arg-type]
-
-
-def _are_near(stated: object, follows: object, rounding: float) -> bool:
-    """Tell whether two numbers are one but for rounding; True and False are none."""
-    if not (isinstance(stated, float) and isinstance(follows, float)):
-        return False
-    return math.isclose(stated, follows, rel_tol=rounding, abs_tol=rounding)
 
 
 def json_schema(kind: type[Artefact]) -> Node:

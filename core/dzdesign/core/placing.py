@@ -91,18 +91,23 @@ def beside(path: Path) -> Path:
     return path.parent / f"{UNPLACED}{secrets.token_hex(6)}"
 
 
-def put_in_place(staging: Path, folder: Path) -> None:
-    """Put `staging` in the place of `folder`, which exists and goes.
+def put_in_place(new: Path, place: Path) -> None:
+    """Put a file or a folder in its place; what was there goes.
 
-    In two steps: between them a kill leaves the old folder beside its place, from where `bring_back` fetches it.
+    A folder that was there goes in two steps: between them a kill leaves it beside its place, from where `bring_back`
+    fetches it.
     """
-    retired = _retired(folder)
+    durable, retired = not is_scratch(place), _retired(place)
+    if durable:
+        _sync_content(new)
     try:
-        os.replace(folder, retired)
-        os.replace(staging, folder)
-        sync_folder(folder.parent)  # before the old one is removed: the removal must not reach the disk alone
+        if place.is_dir():
+            os.replace(place, retired)
+        os.replace(new, place)
+        if durable:  # before the old one is removed: the removal must not reach the disk alone
+            sync_folder(place.parent)
     except BaseException:
-        bring_back(folder)
+        bring_back(place)
         raise
     shutil.rmtree(retired, ignore_errors=True)
 
@@ -123,8 +128,7 @@ def _retired(folder: Path) -> Path:
     return folder.parent / f"{RETIRED}{sha256(os.fsencode(folder.name)).hexdigest()[:16]}"
 
 
-def sync_file(path: Path) -> None:
-    """Wait until a file's content is on the disk."""
+def _sync_file(path: Path) -> None:
     # Windows syncs only what is open for writing, Linux also what is read-only.
     try:
         descriptor = os.open(path, os.O_RDONLY if FOLDERS_OPEN else os.O_RDWR)
@@ -142,7 +146,7 @@ def sync_folder(path: Path) -> None:
     """Wait until the names in a folder are on the disk; a system or file system that can't is not an error."""
     if FOLDERS_OPEN:
         with contextlib.suppress(OSError):  # no right to read it, or a network's file system without such a call
-            sync_file(path)
+            _sync_file(path)
 
 
 def make_folder(path: Path) -> None:
@@ -157,10 +161,12 @@ def make_folder(path: Path) -> None:
         sync_folder(path.parent)
 
 
-def sync_tree(folder: Path) -> None:
-    """Wait until all files in a folder, and the folder itself, are on the disk; what a link leads to is not touched."""
-    for place, _, names in os.walk(folder, topdown=False):
-        for path in (Path(place) / name for name in names):
-            if path.is_file() and not path.is_symlink():
-                sync_file(path)
+def _sync_content(path: Path) -> None:
+    """Wait until a file, or all in a folder, is on the disk; what a link leads to is not touched."""
+    if path.is_file():
+        _sync_file(path)
+    for place, _, names in os.walk(path, topdown=False):
+        for each in (Path(place) / name for name in names):
+            if each.is_file() and not each.is_symlink():
+                _sync_file(each)
         sync_folder(Path(place))

@@ -36,8 +36,12 @@ def find_program(name: str, folders: Sequence[str] | None = None) -> str | None:
     if os.path.dirname(name):
         folder, name = os.path.split(os.path.abspath(name))
         folders = [folder]
-    found = [shutil.which(name, path=folder) for folder in (search_folders() if folders is None else folders)]
-    return next((path for path in found if path and os.path.isabs(path)), None)  # Windows adds the working folder
+    for folder in search_folders() if folders is None else folders:
+        # The second for Windows and Python 3.11, whose first adds no ending; it looks into the working folder before.
+        found = shutil.which(os.path.join(folder, name)) or shutil.which(name, path=folder)
+        if found and os.path.isabs(found):
+            return found
+    return None
 
 
 def search_folders() -> list[str]:

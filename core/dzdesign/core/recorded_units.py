@@ -9,7 +9,7 @@ A number in a text is written with a format and the unit in which it is computed
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, replace
@@ -287,14 +287,6 @@ def worded(template: str, /, **numbers: object) -> str:
     'it opens at 12.32 mA'
     """
     return _Filler().vformat(template, (), numbers)
-
-
-Worded = str
-
-
-def all_of(texts: Sequence[str], between: str = " and ") -> str:
-    """Return several texts as one."""
-    return between.join(texts)
 
 
 #: Spellings of a unit the name of which is another.

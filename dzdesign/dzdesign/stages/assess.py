@@ -3,9 +3,8 @@
 from dataclasses import KW_ONLY, dataclass
 from typing import TYPE_CHECKING, Annotated
 
-from dzdesign.core.artefact_types import quantity
 from dzdesign.core.errors import InputError
-from dzdesign.core.option_readers import percent_range
+from dzdesign.core.option_readers import percent_range, quantity
 from dzdesign.core.options import FIT, RECORDINGS, AnyPath, Option, Paths, Table, Text, read_options
 from dzdesign.core.units import parse_quantity
 from dzdesign.stages.recordings import (

@@ -7,10 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from dzdesign.core.artefact_files import check_file_may_be_written, write_file
-from dzdesign.core.artefact_types import quantity
 from dzdesign.core.documents import read_bytes
 from dzdesign.core.errors import InputError, RequirementError
-from dzdesign.core.option_readers import percent
+from dzdesign.core.option_readers import percent, quantity
 from dzdesign.core.options import AnyPath, Option, Text
 from dzdesign.stages.design import given_compensator, refuse_underived
 

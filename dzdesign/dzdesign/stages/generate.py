@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from dzdesign.core.artefact_files import check_folder_may_be_written
-from dzdesign.core.artefact_types import quantity
 from dzdesign.core.documents import parse_document, read_bytes
 from dzdesign.core.errors import InputError, quoted
-from dzdesign.core.option_readers import percent, whole_number
+from dzdesign.core.option_readers import percent, quantity, whole_number
 from dzdesign.core.options import OUTPUTS, AnyPath, Option, Text, flag_of, read_options
 from dzdesign.design.design_choices import DEFAULTS, DesignChoices
 from dzdesign.stages.design import design_options

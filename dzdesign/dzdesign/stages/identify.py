@@ -6,10 +6,9 @@ from dataclasses import KW_ONLY, dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from dzdesign.core.artefact_types import quantity
 from dzdesign.core.dither import read_dithered
 from dzdesign.core.errors import InputError, quoted
-from dzdesign.core.option_readers import number, percent
+from dzdesign.core.option_readers import number, percent, quantity
 from dzdesign.core.options import (
     FIT,
     METER,

@@ -15,9 +15,8 @@ from dzdesign.core.artefact_files import (
     write_file,
     write_files,
 )
-from dzdesign.core.artefact_types import quantity
 from dzdesign.core.errors import InputError, nearest, neighbour, quoted
-from dzdesign.core.option_readers import percent_range, whole_number, with_tolerance
+from dzdesign.core.option_readers import percent_range, quantity, whole_number, with_tolerance
 from dzdesign.core.options import (
     FIT,
     METER,

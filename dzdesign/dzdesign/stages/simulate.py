@@ -7,10 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from dzdesign.core.artefact_files import check_folder_may_be_written, write_folder
-from dzdesign.core.artefact_types import quantity
 from dzdesign.core.dither import read_dithered
 from dzdesign.core.errors import InputError
-from dzdesign.core.option_readers import percent, whole_number
+from dzdesign.core.option_readers import percent, quantity, whole_number
 from dzdesign.core.options import AnyPath, Option, Text, Texts, read_options, texts_of
 from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.core.units import parse_quantity

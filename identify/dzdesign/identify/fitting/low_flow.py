@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.core.recorded_units import Worded, worded
+from dzdesign.core.recorded_units import worded
 from dzdesign.identify.constants import L_MIN, MPA
 from dzdesign.identify.fitting.guarded_thresholds import DECIMALS, GuardedThreshold, Guarding
 from dzdesign.identify.fitting.zero_flow import allowed_at_zero
@@ -182,7 +182,7 @@ def _lowered(
     return Lowered(depth=min(depths), by=row)
 
 
-def _open_below(row: LowFlow, branch: Branch, threshold: float, least: float) -> Worded:
+def _open_below(row: LowFlow, branch: Branch, threshold: float, least: float) -> str:
     return worded(
         "{source} shows at least {flow:.3g L/min} at {u:.4g V} and {at:.3g MPa}. This command lies below the threshold "
         "on {branch} from the ramps, {threshold:.4g V}, and a flow of up to {least:.3g L/min} counts as no flow; add a "

@@ -1,6 +1,6 @@
 """Why a threshold that lies well above zero has no lower bound there: the readings tell it too badly."""
 
-from dzdesign.core.recorded_units import Worded, worded
+from dzdesign.core.recorded_units import worded
 from dzdesign.identify.constants import MPA
 from dzdesign.identify.fitting.guarded_thresholds import Guarding
 from dzdesign.identify.knees.described_tests import DescribedTests
@@ -9,7 +9,7 @@ from dzdesign.identify.knees.described_tests import DescribedTests
 SOFT = 3.0
 
 
-def unknown_threshold(group: DescribedTests, guarding: Guarding) -> Worded | None:
+def unknown_threshold(group: DescribedTests, guarding: Guarding) -> str | None:
     """Return which test's threshold is known too badly, by its noise more than by the ramps' scatter; None: of none.
 
     The first flows of a soft edge, few above a meter's floor, may leave their zero open by volts. Then neither the
