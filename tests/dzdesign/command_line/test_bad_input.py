@@ -43,7 +43,7 @@ def good(tmp_path_factory):
     (folder / "a.csv").write_text(csv(ramp(1.0)))
     (folder / "b.csv").write_text(csv(ramp(4.0, knee=4.8)))
     names = {name: str(folder / name) for name in ("a.csv", "b.csv", "valve.json", "compensator.json", "firmware")}
-    assert main(["identify", names["a.csv"], names["b.csv"], "-o", names["valve.json"]]) == 0
+    assert main(["identify", names["a.csv"], names["b.csv"], "--curve", "line", "-o", names["valve.json"]]) == 0
     assert main(["design", names["valve.json"], "-o", names["compensator.json"]]) == 0
     assert main(["codegen", names["compensator.json"], "-o", names["firmware"]]) == 0
     return folder
