@@ -103,7 +103,7 @@ def test_identify_and_design_print_no_other_unit(folder, printed):
         assert "bar" in text and "mA" in text and "gpm" in text, name
     row = next(line for line in printed.splitlines() if line.lstrip().startswith("r1_")).split()
     assert float(row[-7]) == pytest.approx(OPENS, abs=0.03) and float(row[-6]) == pytest.approx(CLOSES, abs=0.03)
-    offsets = re.findall(r"^ +[\d.]+ +(1\d\.\d+) .*%$", pages["design"], re.MULTILINE)
+    offsets = re.findall(r"^ +[\d.]+ +(1\d\.\d+) .*\d$", pages["design"], re.MULTILINE)
     assert "offset (mA)" in pages["design"] and len(offsets) == 2
     assert all(4 < float(offset) < CLOSES for offset in offsets)
 

@@ -7,7 +7,7 @@ from typing import Annotated
 from dzdesign.core.errors import InputError
 from dzdesign.core.options import AnyPath, Option
 from dzdesign.stages.generate import GenerateArguments, generate
-from dzdesign.terminal.page import print_json
+from dzdesign.terminal.page import print_json, say_results
 from dzdesign.terminal.progress import say
 
 EXAMPLES = (
@@ -67,6 +67,5 @@ def _list_targets(json: bool) -> int:
         print_json({"targets": [{"name": target.name, "description": target.description} for target in everything]})
         return 0
     width = max(len(target.name) for target in everything)
-    for target in everything:
-        print(f"{target.name:{width}}  {target.description}")
+    say_results(*(f"{target.name:{width}}  {target.description}" for target in everything))
     return 0

@@ -1,5 +1,6 @@
 """An assessment on stdout: each quantity before and after, what could not be seen, the limits."""
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from dzdesign.core.display import DOES_NOT_HOLD, verdict_words
@@ -17,7 +18,8 @@ def print_assessment(assessment: "Assessment") -> None:
     from dzdesign.report.sections.quantities import characteristic_quantities
 
     page, units, meter = new_console(), assessment.recorded_units, assessment.meter
-    section = characteristic_section(characteristic_quantities(None, assessment, (), ()), units)
+    shown = replace(assessment, pressures=tuple(_shown_pressures(assessment)) or assessment.pressures)
+    section = characteristic_section(characteristic_quantities(None, shown, (), ()), units)
     put_facts(page, *section.tables)
     lines = [
         *section.lines,
@@ -36,11 +38,11 @@ def print_assessment(assessment: "Assessment") -> None:
 def _ideal_line(assessment: "Assessment") -> list[str]:
     """Return what a straight line from zero to the largest flow would read at the reading flow."""
     read = [
-        f"{found.value:.2f} % at {item.place(assessment.recorded_units)}"
+        f"{found.value:.2f} % ({item.place(assessment.recorded_units)})"
         for item in _shown_pressures(assessment)
         if (found := item.quantities["ideal_line"].after) and found.value is not None
     ]
-    return [f"An ideal line from zero reads {', '.join(read)} at the reading flow."] if read else []
+    return [f"At the reading flow an ideal line from zero reads {', '.join(read)}."] if read else []
 
 
 def _not_observable(assessment: "Assessment") -> list[str]:

@@ -33,13 +33,6 @@ def _rational(value: "Fraction") -> str:
     return f"{value} = {float(value):.5f}"
 
 
-def _tables(compensator: "Compensator", nodes: int) -> str:
-    """Say how many tables of beta there are: the line and the offset have one each where a transition parts them."""
-    if compensator.transition_codes:
-        return f"beta tables: {nodes} nodes each, for the line and for the offset"
-    return f"beta table: {nodes} nodes"
-
-
 def print_design(compensator: "Compensator") -> None:
     """Print a compensator, and what each way with the hysteresis would leave."""
     from dzdesign.design.redesign import hysteresis_choices
@@ -70,8 +63,6 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
         lines += [
             f"{label}the law's line: u_min0/u_max = {_rational(side.u_min0_over_u_max)} at dP0 ({side.start}), drive "
             f"range of the law k x_max/u_max = {_rational(side.drive_range_over_u_max)} (from there to full output)",
-            f"{label}{_tables(compensator, len(side.beta))}, linear between them, "
-            f"resolution 1/{compensator.beta_denominator}",
             f"{label}certificate (covers {compensator.certified_of}): the offset stays below the "
             f"{100 * certificate.confidence:.6g}% lower bound of the {certificate.guard} threshold "
             f"{units.span(low, high, '.3f MPa')}, at every pressure code; "

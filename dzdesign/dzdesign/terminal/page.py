@@ -79,15 +79,20 @@ def put_rows(
 
 
 def put_facts(console: "Console", *tables: "PageTable | None") -> None:
-    """Print tables of the report."""
+    """Print tables of the report; what a cell has more than its text stands below, where the text alone tells which."""
     for table in filter(None, tables):
         words = [at for at in range(len(table.columns)) if all(row[at].kind in WORDS for row in table.rows)]
-        printed = Table(table.caption, *table.columns, words=words)
+        printed, below = Table(table.caption, *table.columns, words=words), dict[str, list[str]]()
+        names = [row[0].text for row in table.rows]
         for row in table.rows:
-            printed.add_row(*(f"{cell.text} ({cell.more})" if cell.more else cell.text for cell in row))
+            alone = names.count(row[0].text) == 1
+            printed.add_row(*(cell.text if alone or not cell.more else f"{cell.text} ({cell.more})" for cell in row))
+            for cell in row:
+                if alone and cell.more:
+                    below.setdefault(cell.more, []).append(cell.text)
         put_table(console, printed)
-        for note in table.notes:
-            put_line(console, note)
+        for line in (*(f"{', '.join(texts)} ({more})" for more, texts in below.items()), *table.notes):
+            put_line(console, line)
 
 
 class Table:
