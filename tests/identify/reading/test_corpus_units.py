@@ -28,8 +28,7 @@ def test_working_ports_in_silence_are_seen(name, tmp_path, monkeypatch):
     """The fault that this was written for: pA - pB wherever both stand, whatever stands beside them."""
 
     def in_silence(quantities) -> MeteringEdge:
-        working = {"pA", "pB"}
-        return metering_edge(working if working <= set(quantities) else quantities)
+        return metering_edge({"pA", "pB"} if {"pA", "pB"} <= set(quantities) else quantities)
 
     for module in (columns, ramp_files):
         monkeypatch.setattr(module, "metering_edge", in_silence)
@@ -66,8 +65,7 @@ def forget_that_a_reading_falls_on_the_negative_side(monkeypatch):
 
 def read_a_signal_as_its_column(monkeypatch):
     read = scaling.read_signal_range
-    seen = lambda text, name, **more: None if name == "u" else read(text, name, **more)  # noqa: E731
-    monkeypatch.setattr(scaling, "read_signal_range", seen)
+    monkeypatch.setattr(scaling, "read_signal_range", lambda *of, **more: None if of[1] == "u" else read(*of, **more))
 
 
 @pytest.mark.parametrize(

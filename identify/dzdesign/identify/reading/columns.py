@@ -6,7 +6,7 @@ The reader's own recognition goes first; a quantity whose label it does not know
 import re
 from collections.abc import Collection, Iterable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
 
@@ -20,13 +20,11 @@ from dzdesign.identify.reading.clock import ClockColumns, is_milliseconds
 from dzdesign.identify.reading.column_labels import (
     COLUMN_NAMES,
     EXAMPLE_UNITS,
-    LESS,
     MOST_MEANT,
     PRESSURES,
     QUANTITY_OF_COLUMN,
     Column,
     fits,
-    labelled_columns,
     long_format,
     names_a_quantity,
     no_flow,
@@ -34,6 +32,7 @@ from dzdesign.identify.reading.column_labels import (
     split_column,
     split_label,
 )
+from dzdesign.identify.reading.labelled_columns import LESS, labelled_columns, with_own_clocks, without_time
 from dzdesign.identify.reading.metering_edge import (
     PORTS,
     MeteringEdge,
@@ -74,7 +73,7 @@ def find_columns(table: Table, chosen: Mapping[str, str], sample_rate: float | N
     clocks = ClockColumns(table)
     columns = labelled_columns(table, chosen, clocks)
     if sample_rate is not None:
-        columns = _without_time(table, columns, clocks, sample_rate)
+        columns = without_time(table, columns, clocks, sample_rate)
     edge = metering_edge(columns)
     if edge.ambiguous:
         labels = {quantity: column.label for quantity, column in columns.items()}
@@ -95,47 +94,7 @@ def find_columns(table: Table, chosen: Mapping[str, str], sample_rate: float | N
     for quantity in ("u", "time", "Q") if several else ("time", "u", "Q") if sample_rate is None else ("u", "Q"):
         if quantity not in columns:
             raise _missing_column(quantity, table, chosen, columns, clocks, time_is_declared=sample_rate is not None)
-    return columns if sample_rate is not None else _with_own_clocks(table, columns, clocks)
-
-
-def _with_own_clocks(table: Table, columns: dict[str, Column], clocks: ClockColumns) -> dict[str, Column]:
-    """Return columns with those of time of their own; refuse another one for the command than its own."""
-    time = columns["time"]
-    for quantity, column in columns.items():
-        own = clocks.of(quantity, column.label) if quantity != "time" else ""
-        if column.less and clocks.of(quantity, column.less.label) != own:
-            raise InputError(
-                f"'{table.path}': '{column.label}' and '{column.less.label}' have clocks of their own, and no "
-                "difference of the two is taken; export the commands with one"
-            )
-        if not own or time.label in (own, table.dated(own)):
-            continue
-        if quantity == "u":
-            raise InputError(
-                f"'{table.path}': '{own}' is the column of time of '{column.label}', but --columns names "
-                f"'{time.label}'; name '{own}', or none"
-            )
-        clock = clocks.column(own)
-        columns[quantity] = replace(column, clock=clock if clock.unit else replace(clock, unit=time.unit))
-    return columns
-
-
-def _without_time(
-    table: Table, columns: dict[str, Column], clocks: ClockColumns, sample_rate: float
-) -> dict[str, Column]:
-    """Return columns without one of time whose unit nobody knows; refuse a clock."""
-    time, times = columns.get("time"), clocks.labels
-    if len(times) > 1:
-        raise InputError(
-            f"'{table.path}' has columns of time ('{times[0]}', '{times[1]}'), and --sample-rate declares "
-            f"{sample_rate:g} Hz too; leave it out"
-        )
-    if time is not None and fits(time.unit, "time"):
-        raise InputError(
-            f"'{table.path}' has a column of time ('{time.label}'), and --sample-rate declares {sample_rate:g} Hz too; "
-            "leave one of them out"
-        )
-    return {quantity: column for quantity, column in columns.items() if quantity != "time"}
+    return columns if sample_rate is not None else with_own_clocks(table, columns, clocks)
 
 
 def _missing_column(
