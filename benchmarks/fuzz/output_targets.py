@@ -12,13 +12,13 @@ from dzdesign.codegen.amplifier.device import DEVICE_NAMES, device_named
 from dzdesign.codegen.amplifier.files import amplifier_file, is_file_of
 from dzdesign.codegen.amplifier.setting import amplifier_setting
 from dzdesign.codegen.other_targets import Output, generate_output
-from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.fixed_offset import dead_zones
 from dzdesign.verify.outputs.amplifier import file_checks as amplifier_checks
 from dzdesign.verify.outputs.amplifier_files import READERS
+from tests.support.golden_firmware import golden_compensator
 
 TESTS = Path(__file__).parents[2] / "tests"
 #: Codes that a function in MATLAB is tried with, and numbers that a function block is.
@@ -31,8 +31,7 @@ BLOCK_SETTINGS = {"interface": "plc", "dialect": "twincat"}
 @cache
 def compensator(folder: str = "goldens") -> Compensator:
     """Return the compensator of the goldens."""
-    content = (TESTS / folder / "compensator.json").read_bytes()
-    return read_artefact(content, Compensator, "compensator.json")
+    return golden_compensator(root=TESTS / folder)
 
 
 @cache

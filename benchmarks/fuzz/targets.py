@@ -16,7 +16,7 @@ from dzdesign.assess.limits import parse_limits
 from dzdesign.command_line.options_file import options_from_file
 from dzdesign.command_line.parser import arguments_of_command
 from dzdesign.core.artefact_reading import read_artefact
-from dzdesign.core.artefact_types import schema_of
+from dzdesign.core.artefact_types import schema_of, to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.core.units import SI_UNIT, parse_quantity
 from dzdesign.design.compensator import Compensator
@@ -32,6 +32,7 @@ from dzdesign.report.lot.summary import ValveManifest
 from dzdesign.verify.closed_loop.plant import read_plant
 from dzdesign.verify.closed_loop.ramps import read_curves
 from dzdesign.verify.evidence import Evidence, OutputEvidence
+from tests.support.golden_firmware import golden_compensator
 
 GOLDENS = Path(__file__).parents[2] / "tests" / "goldens"
 CSV = b"# bench 3\ntime_s;u [V];dP (bar);Q_Lmin\n" + b"".join(
@@ -111,7 +112,7 @@ TARGETS = {
     ),
     "compensator": Target(
         run=lambda data: read_artefact(data, Compensator, "compensator.json"),
-        seeds=lambda: [(GOLDENS / "compensator.json").read_bytes()],
+        seeds=lambda: [to_json_bytes(golden_compensator())],
     ),
     "artefacts": Target(run=_artefacts, seeds=_artefact_seeds),
     "curves": Target(

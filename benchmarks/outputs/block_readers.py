@@ -15,8 +15,7 @@ from xml.etree import ElementTree
 from scoreboard import Row, print_rows
 
 from dzdesign.codegen.other_targets import generate_output
-from dzdesign.core.artefact_reading import read_artefact
-from dzdesign.design.compensator import Compensator
+from tests.support.golden_firmware import golden_compensator
 
 ROOT = Path(__file__).parents[2]
 NAME, ROOTS = "FB_DeadZone", ("goldens", "goldens_full")
@@ -24,8 +23,7 @@ NAME, ROOTS = "FB_DeadZone", ("goldens", "goldens_full")
 
 def texts(root: str, dialect: str, interface: str) -> dict[str, str]:
     """Return the text of each file of an output that a PLC's tool reads."""
-    source = ROOT / "tests" / root / "compensator.json"
-    compensator = read_artefact(source.read_bytes(), Compensator, source.name)
+    compensator = golden_compensator(root=ROOT / "tests" / root)
     settings = {"dialect": dialect, "interface": interface}
     files = generate_output(compensator, "iec61131", settings).files
     found = {f"{NAME}.st": files[f"{NAME}.st"].decode()}

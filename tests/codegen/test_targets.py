@@ -27,6 +27,7 @@ from dzdesign.codegen.other_targets import ALL_TARGET_NAMES, OTHER_TARGETS
 from dzdesign.codegen.project import TARGET_NAMES, generate, target_named, targets
 from dzdesign.codegen.target import folder_of
 from dzdesign.command_line.cli import main
+from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import DzdesignError, InputError
 from dzdesign.verify.toolchain.host_compiler import STRICT, host_compiler
 from tests.support.documented_commands import try_page
@@ -89,7 +90,9 @@ def test_the_wheel_generates_for_every_target(tmp_path):
         " for t in targets()]))"
     )
     environment = {**os.environ, "PYTHONPATH": str(tmp_path / "installed")}
-    command = [sys.executable, "-c", code, str(GOLDENS / "compensator.json")]
+    designed = tmp_path / "compensator.json"
+    designed.write_bytes(to_json_bytes(golden_compensator()))
+    command = [sys.executable, "-c", code, str(designed)]
     done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path, env=environment)
     assert done.returncode == 0, done.stderr
     where, *listings = json.loads(done.stdout)

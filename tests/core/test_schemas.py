@@ -11,6 +11,7 @@ from docs.generated import SCHEMAS, one_line_a_field, schema_document, schema_te
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.identify.options import IdentifyOptions
+from tests.support.golden_firmware import FULL, golden_compensator
 from tests.support.paths import GOLDENS_FULL
 from tests.support.schema_checks import overlooked, problems, resolved
 from tests.support.synthetic import Truth, needs_compiler, synthetic_ramp
@@ -125,7 +126,7 @@ def test_other_valves_fit(case):
 
 
 def test_a_compensator_with_every_option_fits():
-    document = json.loads((GOLDENS / "compensator.json").read_text())
+    document = json.loads(to_json_bytes(golden_compensator(root=FULL)))
     assert document["sides"]["negative"] and document["transition_codes"]
     assert problems("compensator", document) == [] and problems("valve", document["valve"]) == []
 

@@ -19,6 +19,8 @@ from pathlib import Path
 import numpy as np
 
 from dzdesign.core.artefact_files import MANIFEST_NAME
+from dzdesign.core.artefact_types import to_json_bytes
+from tests.support.golden_firmware import golden_compensator
 from tests.support.paths import GOLDENS
 
 #: Modules that are imported by every command, or by a library of it, from the folder that it stands in if it may.
@@ -181,7 +183,7 @@ def _links(place: Path, outside: Path) -> list[str]:
 
 def _folders(place: Path, outside: Path) -> list[str]:
     """Make folders that look like those of dzdesign, and name what lies outside."""
-    compensator = (GOLDENS / "compensator.json").read_bytes()
+    compensator = to_json_bytes(golden_compensator())
     manifest = {
         "schema": "dzdesign.firmware/1", "files": {"../../outside/secret.json": "0" * 64, "/etc/passwd": "0" * 64},
         "core": ["../../outside/secret.json"], "target": "{{7*7}}", "board": ["../../outside/secret.json"],

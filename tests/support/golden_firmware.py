@@ -155,7 +155,6 @@ def update() -> None:
     golden_valve.cache_clear()
     golden_compensator.cache_clear()
     for root in (GOLDENS, FULL):
-        (root / INPUT).write_bytes(to_json_bytes(golden_compensator("host", root)))
         for folder in root.iterdir():
             if folder.is_dir() and folder.name != "schemas":
                 shutil.rmtree(folder)

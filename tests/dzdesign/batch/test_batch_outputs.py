@@ -22,7 +22,6 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import THIS_TOOL, to_json_bytes
 from dzdesign.core.documents import sha256_of
 from dzdesign.core.errors import InputError
-from dzdesign.design.compensator import Compensator
 from dzdesign.report.lot.folder import read_lot
 from dzdesign.report.lot.page import report_of_lot
 from dzdesign.report.lot.summary import LotSummary, ValveManifest, ValveOutput
@@ -31,8 +30,8 @@ from dzdesign.stages import verify as verify_stage
 from dzdesign.verify.evidence import TriedInputs
 from dzdesign.verify.requirements import REPRODUCED
 from tests.dzdesign.batch.test_batch import NOTHING, tree
+from tests.support.golden_firmware import golden_compensator
 from tests.support.many_valves import write_lot
-from tests.support.paths import GOLDENS
 
 PLC = WantedOutput(target="iec61131", settings={"dialect": "codesys", "interface": "plc"}, folder="plc")
 SEED = 7
@@ -86,7 +85,7 @@ def test_a_result_depends_on_the_outputs_that_are_wanted():
 
 @pytest.fixture
 def of_valve(tmp_path):
-    compensator = read_artefact((GOLDENS / "compensator.json").read_bytes(), Compensator, "compensator.json")
+    compensator = golden_compensator()
     return ForOutputs(
         compensator=compensator, document=to_json_bytes(compensator), valve=compensator.valve, recordings=(),
         place=tmp_path, verify=False,

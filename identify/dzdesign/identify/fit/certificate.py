@@ -364,11 +364,11 @@ def continue_above(
         return AboveBound(
             dp_MPa=nodes, bound=certificate.bound[-1] + slope * (nodes - last), certified=rises
         )
-    bend = 2.0 * float(curves.density.max()) if curves.kind == "bends" else float(curves.density.max())
     found = []
     for start in range(knots.size - 1):
         band, value = _band_above(scatter, curves, start, nodes, confidence, unknown_drift)
-        sag = bend / 2 * (nodes - last) * (nodes - knots[start])
+        # Between two tests and beyond them it bends no more than in the outermost interval and those that count.
+        sag = _bend_above(curves, knots, start) / 2 * (nodes - last) * (nodes - knots[start])
         taken_off = float(np.interp(CHOSEN_AT * last, nodes, band + sag))
         found.append((taken_off, start, value - band - sag))
         if curves.kind == "line":
@@ -376,6 +376,20 @@ def continue_above(
     bound = min(found, key=lambda each: each[:2])[2]
     # It is concave, so chords between the nodes lie below it; and it never says more than the last test's own bound.
     return AboveBound(dp_MPa=nodes, bound=np.minimum.accumulate(np.minimum(bound, certificate.bound[-1])))
+
+
+def _bend_above(curves: CurveClass, knots_MPa: np.ndarray, start: int) -> float:
+    """Return M from a knot on, V/MPa².
+
+    An estimated one is the largest of the intervals from there to the last test: in one that is H wide 4 c / H for a
+    change c of the chords' slopes beside it, of either sign. So a kink of c just before the last test and another one
+    just above it, together 2 c (x - b), lie within M/2 (x - a)(x - b).
+    """
+    if curves.change is None:
+        return float(curves.density.max())
+    changes, gaps = np.pad(curves.change.max(axis=0), 1), np.diff(knots_MPa)
+    found = 4 * np.maximum(changes[:-1], changes[1:]) / gaps
+    return float(found[start:].max())
 
 
 def _band_above(
