@@ -16,6 +16,8 @@ import tempfile
 import time
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).parents[2]))  # for what tests support
+
 #: One input takes no longer, s; no input is longer, bytes; and no reader takes more memory, MB.
 SLOWEST_S, LONGEST, MEMORY_MB = 5, 65536, 2048
 NAMES = (

@@ -100,7 +100,7 @@ def refusal(bench, capsys):
         (csv(ramp(), "time_s,u_V,u [V],Q_Lmin").encode(), "two columns of u: 'u_V' and 'u [V]'"),
         (csv(ramp(), "time_s,u_V,pA_MPa,Q_Lmin").encode(), "a column of pA but none of pB"),
         (("# bench 3\n\n" + csv(ramp()) + "1,x,3,4\n").encode(), "row 1004, column 'u_V': 'x' is not a number"),
-        (("# bench 3\n\n" + csv(ramp()) + "1,2,1e30,4\n").encode(), "row 1004, column 'dP_MPa': '1e30'"),
+        (("# bench 3\n\n" + csv(ramp()) + "1,2,1e30,4\n").encode(), "row 1004, column 'dP_MPa': '1e+30'"),
         (("# bench 3\n\n" + csv(ramp()) + "1,2,3,4\n").encode(), "row 1004: the time goes back"),
         ((csv(ramp()) + "1,2,3\n").encode(), "row 1002 has 3 cells, expected 4"),
         ((csv(ramp()) + "1,2,3,4,5\n").encode(), "row 1002 has 5 cells, expected 4"),

@@ -5,6 +5,7 @@
 a quadratic programme. Its curves are what the data say, each at its most likely; the bounds are the certificate's.
 """
 
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -21,6 +22,7 @@ from dzdesign.identify.fit.scatter import Scatter
 if TYPE_CHECKING:
     import casadi as ca
 
+logger = logging.getLogger(__name__)
 #: Held while a solver is built or used: one that is kept serves all threads, and CasADi does not expect two at once.
 SOLVER_LOCK = Lock()
 #: Weights of what the data leave open: bends between the tests, V/MPa² and a drift that the order does not tell.
@@ -74,6 +76,7 @@ def estimate_side(branches: Sequence[Scatter], curves: CurveClass) -> SideEstima
         )  # fmt: skip
         outcome = solver.stats()
         found = np.asarray(ca.DM(solved["x"])).ravel().reshape(len(branches), -1)
+    logger.debug("curves: %s, %.3f s", outcome["unified_return_status"], outcome.get("t_wall_total", 0.0))
     if not outcome["success"]:
         raise InputError(
             f"the curves of the side could not be fitted ({outcome['unified_return_status']}); look at the ramp tests, "
