@@ -9,8 +9,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated
 
-from msgspec import Meta
-
 from dzdesign.core.artefact_types import RuleError, quantity
 from dzdesign.identify.valve.certified_bound import CertifiedBound
 from dzdesign.identify.valve.quantity_types import PressureDrop, Voltage
@@ -23,21 +21,13 @@ ROUNDING = 1e-6
 class AboveTests:
     """The bound above the last tested pressure drop; nothing is known beyond its last node."""
 
-    certified: Annotated[
-        bool,
-        Meta(
-            description="Whether the bound above the tests holds with the side's confidence, provided that its premise "
-            "holds. False: the premise gives no bound there."
-        ),
-    ]
-    dp_MPa: Annotated[
-        tuple[PressureDrop, ...],
-        quantity("MPa", "Nodes from the last tested pressure drop to the point at which the bound reaches zero."),
-    ]
-    u_lower_V: Annotated[
-        tuple[Voltage, ...],
-        quantity("V", "Lower bounds at the nodes, linear between them: the continued threshold minus its errors."),
-    ]
+    certified: bool
+    """Whether the bound above the tests holds with the side's confidence, provided that its premise holds. False: the
+    premise gives no bound there."""
+    dp_MPa: Annotated[tuple[PressureDrop, ...], quantity("MPa")]
+    """Nodes from the last tested pressure drop to the point at which the bound reaches zero."""
+    u_lower_V: Annotated[tuple[Voltage, ...], quantity("V")]
+    """Lower bounds at the nodes, linear between them: the continued threshold minus its errors."""
 
     def __post_init__(self) -> None:
         count = len(self.dp_MPa)

@@ -30,20 +30,18 @@ Deviations = Annotated[float, quantity("1", ge=0, le=1e9)]
 class GuardedRamp:
     """The guarded threshold by one ramp."""
 
-    source: Annotated[str, Meta(description="File of the ramp, and its number and times if the file has several.")]
-    dp_MPa: Annotated[PressureDrop | None, Meta(description="Pressure drop of its test; null if it is unknown.")]
-    u_V: Annotated[Voltage, Meta(description="Guarded threshold by this ramp.")]
-    se_V: Annotated[VoltageError, Meta(description="Standard error by the noise of the ramp's own line.")]
-    budget_V: Annotated[
-        VoltageError,
-        Meta(
-            description="Systematic error to allow for: lag and zero error of the meter, leak, soft edge, and "
-            "stick-slip."
-        ),
-    ]
-    place: Annotated[
-        float, quantity("1", "Place in the series, from -0.5 at the first ramp to 0.5 at the last.", ge=-0.5, le=0.5)
-    ] | None
+    source: str
+    """File of the ramp, and its number and times if the file has several."""
+    dp_MPa: PressureDrop | None
+    """Pressure drop of its test; null if it is unknown."""
+    u_V: Voltage
+    """Guarded threshold by this ramp."""
+    se_V: VoltageError
+    """Standard error by the noise of the ramp's own line."""
+    budget_V: VoltageError
+    """Systematic error to allow for: lag and zero error of the meter, leak, soft edge, and stick-slip."""
+    place: Annotated[float, quantity("1", ge=-0.5, le=0.5)] | None
+    """Place in the series, from -0.5 at the first ramp to 0.5 at the last."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,19 +58,13 @@ class RampSetAside:
 class StateProof:
     """Multipliers that prove the bound of a valve in one state, node by node."""
 
-    state: Annotated[
-        float, quantity("1", "State of the valve, as a place in the series; 0 without a drift.", ge=-0.5, le=0.5)
-    ]
-    direction: Annotated[
-        Literal[-1, 0, 1], Meta(description="Direction of the curve for monotone: falling -1, rising 1; else 0.")
-    ]
-    multipliers: Annotated[
-        tuple[Multipliers, ...],
-        Meta(
-            description="Rows that matter at each node, and the multiplier of each, such as 3:0.25 17:0.75. Rows count "
-            "from 0: those of the class from below, from above, floors, then roofs."
-        ),
-    ]
+    state: Annotated[float, quantity("1", ge=-0.5, le=0.5)]
+    """State of the valve, as a place in the series; 0 without a drift."""
+    direction: Literal[-1, 0, 1]
+    """Direction of the curve for monotone: falling -1, rising 1; else 0."""
+    multipliers: tuple[Multipliers, ...]
+    """Rows that matter at each node, and the multiplier of each, such as 3:0.25 17:0.75. Rows count from 0: those of
+    the class from below, from above, floors, then roofs."""
 
     def rows(self) -> list[np.ndarray]:
         """Return the rows that matter at each node."""
@@ -84,48 +76,40 @@ class StateProof:
 class BoundProof:
     """Ramps, scatter and multipliers from which the bound follows."""
 
-    ramps: Annotated[tuple[GuardedRamp, ...], Meta(description="Ramps that count.", min_length=1)]
-    set_aside: Annotated[tuple[RampSetAside, ...], Meta(description="Ramps that lie off and do not count.")]
-    shared_budget_V: Annotated[
-        VoltageError, Meta(description="Systematic error that all ramps have in common: the meter's lag.")
-    ]
-    knots_MPa: Annotated[
-        tuple[float, ...], quantity("MPa", "Knots of the curve, by the ramps' pressure drops alone.")
-    ]
-    sd_V: Annotated[VoltageError, Meta(description="Standard deviation of one ramp, its noise included.")]
-    origin: Annotated[
-        Origin, Meta(description="Whether that was measured on repeats, declared by --repeatability, or assumed.")
-    ]
-    known_sd_V: Annotated[
-        VoltageError, Meta(description="Declared or assumed standard deviation from ramp to ramp.")
-    ]
-    least_sd_V: Annotated[
-        VoltageError,
-        Meta(description="Least standard deviation: half the distance of two groups of ramps; 0 without such groups."),
-    ]
-    unlike_knot: Annotated[
-        Annotated[int, Meta(ge=0)] | None,
-        Meta(description="Knot, from 0, whose ramps scatter more than the others; null if they scatter alike."),
-    ]
-    floor: Annotated[Deviations, Meta(description="Standard deviations from the sums of the ramps to their floors.")]
-    roof: Annotated[
-        Deviations | None,
-        Meta(
-            description="Standard deviations from the sums of the ramps to their roofs; null if nothing is certified "
-            "between the tests."
-        ),
-    ]
-    floor_unlike: Annotated[Deviations | None, Meta(description="The same at the knot that scatters more.")]
-    roof_unlike: Annotated[Deviations | None, Meta(description="The same at the knot that scatters more.")]
-    declared: Annotated[
-        Literal["line", "smooth", "monotone"] | None,
-        Meta(description="Premise that was declared; null if the bends were estimated, or nothing is between tests."),
-    ]
-    curvature_V_MPa2: Annotated[SecondDifference | None, Meta(description="Declared M of a smooth curve.")]
-    direction: Annotated[
-        Literal[-1, 0, 1], Meta(description="Direction that a monotone curve was given: -1, 1, or 0 for either.")
-    ]
-    states: Annotated[tuple[StateProof, ...], Meta(description="Proofs of the bound in each state.", min_length=1)]
+    ramps: Annotated[tuple[GuardedRamp, ...], Meta(min_length=1)]
+    """Ramps that count."""
+    set_aside: tuple[RampSetAside, ...]
+    """Ramps that lie off and do not count."""
+    shared_budget_V: VoltageError
+    """Systematic error that all ramps have in common: the meter's lag."""
+    knots_MPa: Annotated[tuple[float, ...], quantity("MPa")]
+    """Knots of the curve, by the ramps' pressure drops alone."""
+    sd_V: VoltageError
+    """Standard deviation of one ramp, its noise included."""
+    origin: Origin
+    """Whether that was measured on repeats, declared by --repeatability, or assumed."""
+    known_sd_V: VoltageError
+    """Declared or assumed standard deviation from ramp to ramp."""
+    least_sd_V: VoltageError
+    """Least standard deviation: half the distance of two groups of ramps; 0 without such groups."""
+    unlike_knot: Annotated[int, Meta(ge=0)] | None
+    """Knot, from 0, whose ramps scatter more than the others; null if they scatter alike."""
+    floor: Deviations
+    """Standard deviations from the sums of the ramps to their floors."""
+    roof: Deviations | None
+    """Standard deviations from the sums of the ramps to their roofs; null if nothing is certified between the tests."""
+    floor_unlike: Deviations | None
+    """The same at the knot that scatters more."""
+    roof_unlike: Deviations | None
+    """The same at the knot that scatters more."""
+    declared: Literal["line", "smooth", "monotone"] | None
+    """Premise that was declared; null if the bends were estimated, or nothing is between tests."""
+    curvature_V_MPa2: SecondDifference | None
+    """Declared M of a smooth curve."""
+    direction: Literal[-1, 0, 1]
+    """Direction that a monotone curve was given: -1, 1, or 0 for either."""
+    states: Annotated[tuple[StateProof, ...], Meta(min_length=1)]
+    """Proofs of the bound in each state."""
 
     def scatter(self) -> Scatter:
         """Return the scatter of the ramps."""

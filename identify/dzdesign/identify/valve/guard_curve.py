@@ -6,7 +6,6 @@ from itertools import pairwise
 from typing import Annotated, Literal, get_args
 
 import numpy as np
-from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError, quantity
 from dzdesign.core.recorded_units import RecordedUnits
@@ -41,29 +40,16 @@ ANYWHERE = (1.0,)
 class PremiseCheck:
     """One premise about the threshold between the tests: how it fits them, and the dead zone that it would leave."""
 
-    premise: Annotated[
-        Premise,
-        Meta(
-            description="Premise. line: the threshold is a straight line over the pressure drop. smooth: it has at "
-            "most one kink, or a smooth bend, between two tests, no stronger than the tests show; or its second "
-            "divided difference is at most a declared M. monotone: it only rises or only falls."
-        ),
-    ]
-    lack_of_fit_p: Annotated[
-        Probability | None,
-        Meta(
-            description="Probability of tests that contradict the premise at least as much as these if it were true, "
-            "given noise and scatter. The premise is rejected below 0.01. Null: the tests can't contradict the premise."
-        ),
-    ]
-    dead_zone_over_u_max: Annotated[
-        Ratio | None,
-        quantity(
-            "1",
-            "Largest dead zone on opening that a law without transition would leave on the tested interval. "
-            "The opening knee is taken as straight between tests. Null: no positive offset follows.",
-        ),
-    ]
+    premise: Premise
+    """Premise. line: the threshold is a straight line over the pressure drop. smooth: it has at most one kink, or a
+    smooth bend, between two tests, no stronger than the tests show; or its second divided difference is at most a
+    declared M. monotone: it only rises or only falls."""
+    lack_of_fit_p: Probability | None
+    """Probability of tests that contradict the premise at least as much as these if it were true, given noise and
+    scatter. The premise is rejected below 0.01. Null: the tests can't contradict the premise."""
+    dead_zone_over_u_max: Annotated[Ratio | None, quantity("1")]
+    """Largest dead zone on opening that a law without transition would leave on the tested interval. The opening knee
+    is taken as straight between tests. Null: no positive offset follows."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,51 +59,35 @@ class CertifiedCurve:
     Those of two curves are not meant to hold together: a certificate protects one threshold.
     """
 
-    premise: Annotated[
-        CurvePremise,
-        Meta(description="Premise of the bound between the tests; none: nothing is certified between two tests."),
-    ]
-    premises: Annotated[
-        tuple[PremiseCheck, ...],
-        Meta(description="Premises that these tests allow, with the dead zone that each would leave."),
-    ]
-    curvature_V_MPa2: Annotated[
-        SecondDifference | None,
-        quantity("V/MPa2", "Largest curvature M that a smooth curve may have; null for another premise."),
-    ]
-    curvature_is: Annotated[
-        Literal["declared", "estimated"] | None,
-        Meta(description="Whether the M of a smooth curve was declared or estimated; null for another premise."),
-    ]
-    dp_MPa: Annotated[
-        tuple[PressureDrop, ...], quantity("MPa", "Tested pressure drops; empty if the pressure drop is unknown.")
-    ]
-    u_threshold_V: Annotated[tuple[Voltage, ...], quantity("V", "Guarded threshold at each test.")]
-    u_lower_V: Annotated[tuple[Voltage, ...], quantity("V", "Lower bound of the threshold at each test.")]
-    bound_dp_MPa: Annotated[
-        tuple[PressureDrop, ...], quantity("MPa", "Nodes of the bound; empty if the pressure drop is unknown.")
-    ]
-    bound_V: Annotated[
-        tuple[Voltage, ...],
-        quantity(
-            "V",
-            "Lower bound of the threshold at each node: the largest that no threshold contradicts which the ramps and "
-            "the premise allow. It is linear between the nodes, except for none, which has tests alone.",
-        ),
-    ]
-    proof: Annotated[BoundProof, Meta(description="Ramps, scatter and multipliers from which the bound follows.")]
-    u_min0_V: Annotated[Voltage, Meta(description="Largest offset at dP0 that the certificate allows.")]
-    offset_dp_MPa: Annotated[
-        tuple[PressureDrop, ...], quantity("MPa", "Nodes of the offset; empty if the pressure drop is unknown.")
-    ]
-    offset_V: Annotated[
-        tuple[Voltage, ...],
-        quantity("V", "Largest piecewise linear offset below the bound that follows the direction of the trend."),
-    ]
-    above: Annotated[
-        AboveTests | None,
-        Meta(description="Bound above the last test; null if the premise says nothing there."),
-    ]
+    premise: CurvePremise
+    """Premise of the bound between the tests; none: nothing is certified between two tests."""
+    premises: tuple[PremiseCheck, ...]
+    """Premises that these tests allow, with the dead zone that each would leave."""
+    curvature_V_MPa2: Annotated[SecondDifference | None, quantity("V/MPa2")]
+    """Largest curvature M that a smooth curve may have; null for another premise."""
+    curvature_is: Literal["declared", "estimated"] | None
+    """Whether the M of a smooth curve was declared or estimated; null for another premise."""
+    dp_MPa: Annotated[tuple[PressureDrop, ...], quantity("MPa")]
+    """Tested pressure drops; empty if the pressure drop is unknown."""
+    u_threshold_V: Annotated[tuple[Voltage, ...], quantity("V")]
+    """Guarded threshold at each test."""
+    u_lower_V: Annotated[tuple[Voltage, ...], quantity("V")]
+    """Lower bound of the threshold at each test."""
+    bound_dp_MPa: Annotated[tuple[PressureDrop, ...], quantity("MPa")]
+    """Nodes of the bound; empty if the pressure drop is unknown."""
+    bound_V: Annotated[tuple[Voltage, ...], quantity("V")]
+    """Lower bound of the threshold at each node: the largest that no threshold contradicts which the ramps and the
+    premise allow. It is linear between the nodes, except for none, which has tests alone."""
+    proof: BoundProof
+    """Ramps, scatter and multipliers from which the bound follows."""
+    u_min0_V: Voltage
+    """Largest offset at dP0 that the certificate allows."""
+    offset_dp_MPa: Annotated[tuple[PressureDrop, ...], quantity("MPa")]
+    """Nodes of the offset; empty if the pressure drop is unknown."""
+    offset_V: Annotated[tuple[Voltage, ...], quantity("V")]
+    """Largest piecewise linear offset below the bound that follows the direction of the trend."""
+    above: AboveTests | None
+    """Bound above the last test; null if the premise says nothing there."""
 
     def __post_init__(self) -> None:
         for name, nodes, values in (

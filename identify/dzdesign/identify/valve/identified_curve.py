@@ -23,24 +23,16 @@ BETA_ROUNDING = 1e-3
 class IdentifiedCurve:
     """Thresholds (knees) of one branch by the fit of the side, and their ratio of Eq. (5); one entry for each test."""
 
-    dp_MPa: Annotated[
-        tuple[PressureDrop, ...], quantity("MPa", "Tested pressure drops; empty if the pressure drop is unknown.")
-    ]
-    u_V: Annotated[
-        tuple[Voltage, ...], quantity("V", "Threshold u_min at each test: the knee as fitted under the premise.")
-    ]
-    u_se_V: Annotated[
-        tuple[VoltageError, ...],
-        quantity(
-            "V",
-            "Standard error of the threshold by noise, scatter from ramp to ramp, and the width of the straight part.",
-        ),
-    ]
-    beta: Annotated[
-        tuple[IdentifiedRatio, ...],
-        quantity("1", "Threshold relative to that at dP0 (Eq. 5); empty if the pressure drop is unknown."),
-    ]
-    beta_se: Annotated[tuple[RatioError, ...], quantity("1", "Standard error of beta; 0 at dP0.")]
+    dp_MPa: Annotated[tuple[PressureDrop, ...], quantity("MPa")]
+    """Tested pressure drops; empty if the pressure drop is unknown."""
+    u_V: Annotated[tuple[Voltage, ...], quantity("V")]
+    """Threshold u_min at each test: the knee as fitted under the premise."""
+    u_se_V: Annotated[tuple[VoltageError, ...], quantity("V")]
+    """Standard error of the threshold by noise, scatter from ramp to ramp, and the width of the straight part."""
+    beta: Annotated[tuple[IdentifiedRatio, ...], quantity("1")]
+    """Threshold relative to that at dP0 (Eq. 5); empty if the pressure drop is unknown."""
+    beta_se: Annotated[tuple[RatioError, ...], quantity("1")]
+    """Standard error of beta; 0 at dP0."""
 
     def __post_init__(self) -> None:
         count = len(self.u_V)

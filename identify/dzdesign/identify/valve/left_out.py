@@ -4,8 +4,6 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from msgspec import Meta
-
 from dzdesign.core.artefact_types import quantity
 from dzdesign.core.recorded_units import RecordedUnits
 
@@ -27,22 +25,18 @@ AnyPressure = Annotated[float, quantity("MPa", ge=-1e3, le=1e3)]
 class LeftOut:
     """A part of a recording that belongs to no ramp."""
 
-    recording: Annotated[str, Meta(description="Name of the recording.")]
-    from_s: Annotated[Time, Meta(description="Time of the first sample left out, on the recording's own clock.")]
-    to_s: Annotated[Time, Meta(description="Time of the last sample left out.")]
-    reason: Annotated[
-        Literal["option", "pressure", "no-pressure", "partial", "no-ramp"],
-        Meta(
-            description="Reason why it was left out. option: --from or --to. pressure: a rest or part of a ramp at "
-            "another pressure drop, such as before the pump started. no-pressure: a sweep without pressure "
-            "or flow. partial: a sweep that stays below half of the largest command. no-ramp: a fragment "
-            "without a ramp."
-        ),
-    ]
-    dp_MPa: Annotated[
-        tuple[AnyPressure, AnyPressure] | None,
-        quantity("MPa", "Lowest and highest pressure drop in the part left out; null if unknown."),
-    ]
+    recording: str
+    """Name of the recording."""
+    from_s: Time
+    """Time of the first sample left out, on the recording's own clock."""
+    to_s: Time
+    """Time of the last sample left out."""
+    reason: Literal["option", "pressure", "no-pressure", "partial", "no-ramp"]
+    """Reason why it was left out. option: --from or --to. pressure: a rest or part of a ramp at another pressure drop,
+    such as before the pump started. no-pressure: a sweep without pressure or flow. partial: a sweep that stays below
+    half of the largest command. no-ramp: a fragment without a ramp."""
+    dp_MPa: Annotated[tuple[AnyPressure, AnyPressure] | None, quantity("MPa")]
+    """Lowest and highest pressure drop in the part left out; null if unknown."""
 
 
 def left_out_in_words(parts: Iterable[LeftOut], units: RecordedUnits) -> Iterator[str]:

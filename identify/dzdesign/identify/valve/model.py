@@ -30,25 +30,18 @@ DECIMALS = 7
 class Meter:
     """Properties of the flow meter as assumed."""
 
-    floor_L_min: Annotated[Flow, Meta(description="Flow below which the meter reads zero, declared or found.")]
-    lag_s: Annotated[float, quantity("s", "Lag of the meter; below zero if the command comes late.", ge=-1e6, le=1e6)]
-    lag_is: Annotated[
-        LagOrigin,
-        Meta(description="Whether the lag was declared or identified. If it is unknown, it was taken as zero."),
-    ]
-    lag_longer_s: Annotated[
-        float,
-        quantity(
-            "s", "Largest amount by which the true lag may be longer; it lowers the bounds on opening.", ge=0, le=1e6
-        ),
-    ]
-    lag_shorter_s: Annotated[
-        float,
-        quantity(
-            "s", "Largest amount by which the true lag may be shorter; it lowers the bounds on closing.", ge=0, le=1e6
-        ),
-    ]
-    zero_L_min: Annotated[Flow, Meta(description="Bound of the meter's zero error, by which all bounds are lowered.")]
+    floor_L_min: Flow
+    """Flow below which the meter reads zero, declared or found."""
+    lag_s: Annotated[float, quantity("s", ge=-1e6, le=1e6)]
+    """Lag of the meter; below zero if the command comes late."""
+    lag_is: LagOrigin
+    """Whether the lag was declared or identified. If it is unknown, it was taken as zero."""
+    lag_longer_s: Annotated[float, quantity("s", ge=0, le=1e6)]
+    """Largest amount by which the true lag may be longer; it lowers the bounds on opening."""
+    lag_shorter_s: Annotated[float, quantity("s", ge=0, le=1e6)]
+    """Largest amount by which the true lag may be shorter; it lowers the bounds on closing."""
+    zero_L_min: Flow
+    """Bound of the meter's zero error, by which all bounds are lowered."""
 
     def lag_in_words(self) -> str:
         """Return the lag with its tolerance and how it is known."""
@@ -84,9 +77,8 @@ class ValveModel(ShownInNotebooks, Artefact):
     """An identified valve, as `dzdesign identify` writes it."""
 
     FILE_NAME: ClassVar[str] = "valve.json"
-    schema: Annotated[Literal["dzdesign.valve/1"], Meta(description="Name and version of this schema.")] = (
-        "dzdesign.valve/1"
-    )
+    schema: Literal["dzdesign.valve/1"] = "dzdesign.valve/1"
+    """Name and version of this schema."""
     record: Annotated[
         Mapping[
             Annotated[str, Meta(min_length=1, max_length=LONGEST_NAME)],
@@ -98,58 +90,33 @@ class ValveModel(ShownInNotebooks, Artefact):
             max_length=MOST_ENTRIES,
         ),
     ]
-    options: Annotated[
-        StatedOptions | None,
-        Meta(
-            description="Options of `identify` that reproduce this file from the files in made_from; null if they were "
-            "not recorded."
-        ),
-    ] = None
-    simulated: Annotated[
-        bool,
-        Meta(
-            description="Whether a recording is simulated. A simulation is no measurement, so its firmware must not be "
-            "used on a machine."
-        ),
-    ]
-    u_max_V: Annotated[float, quantity("V", "Full command.", ge=1e-3, le=1e4)]
-    meter: Annotated[Meter, Meta(description="Properties of the flow meter as assumed.")]
-    knee_window: Annotated[
-        tuple[Probability, Probability],
-        quantity(
-            "1", "Initial range in which the characteristic was taken as straight, as shares of the largest flow."
-        ),
-    ]
+    options: StatedOptions | None = None
+    """Options of `identify` that reproduce this file from the files in made_from; null if they were not recorded."""
+    simulated: bool
+    """Whether a recording is simulated. A simulation is no measurement, so its firmware must not be used on a
+    machine."""
+    u_max_V: Annotated[float, quantity("V", ge=1e-3, le=1e4)]
+    """Full command."""
+    meter: Meter
+    """Properties of the flow meter as assumed."""
+    knee_window: Annotated[tuple[Probability, Probability], quantity("1")]
+    """Initial range in which the characteristic was taken as straight, as shares of the largest flow."""
     sides: Annotated[
-        Mapping[str, SideModel],
-        Meta(
-            description="Tested sides of the valve: one or both.",
-            min_length=1,
-            extra_json_schema={"propertyNames": {"enum": list(SIDES)}},
-        ),
+        Mapping[str, SideModel], Meta(min_length=1, extra_json_schema={"propertyNames": {"enum": list(SIDES)}})
     ]
-    untested_sides: Annotated[
-        tuple[Literal["positive", "negative"], ...], Meta(description="Sides without a usable recording.")
-    ] = field(init=False)
-    warnings: Annotated[tuple[Warning_, ...], Meta(description="Warnings in descending order of importance.")]
-    recorded_units: Annotated[
-        RecordedUnits,
-        Meta(
-            description="Units of the recordings, in which values are displayed; the file itself uses V, MPa and "
-            "L/min. For a quantity recorded in several units the displayed units are V, MPa and L/min, "
-            "too."
-        ),
-    ] = AS_COMPUTED
-    dithered: Annotated[
-        Dither | UnsetType,
-        Meta(
-            description="Dither that the drive superimposed on the command during the ramps. Thresholds and "
-            "characteristics are those of the dithered valve. Omitted if there was none."
-        ),
-    ] = UNSET
-    content_sha256: Annotated[str, Meta(description="SHA-256 of all other keys, which reveals an accidental edit.")] = (
-        field(init=False)
-    )
+    """Tested sides of the valve: one or both."""
+    untested_sides: tuple[Literal["positive", "negative"], ...] = field(init=False)
+    """Sides without a usable recording."""
+    warnings: tuple[Warning_, ...]
+    """Warnings in descending order of importance."""
+    recorded_units: RecordedUnits = AS_COMPUTED
+    """Units of the recordings, in which values are displayed; the file itself uses V, MPa and L/min. For a quantity
+    recorded in several units the displayed units are V, MPa and L/min, too."""
+    dithered: Dither | UnsetType = UNSET
+    """Dither that the drive superimposed on the command during the ramps. Thresholds and characteristics are those of
+    the dithered valve. Omitted if there was none."""
+    content_sha256: str = field(init=False)
+    """SHA-256 of all other keys, which reveals an accidental edit."""
 
     def __post_init__(self) -> None:
         if not self.sides or not set(self.sides) <= set(SIDES):

@@ -19,29 +19,13 @@ LARGEST = 1e9
 class RampConditions:
     """Pace and sampling of the ramps of one test."""
 
-    rate_V_s: (
-        Annotated[
-            float,
-            quantity(
-                "V/s", "Rate of the command ramp, the fastest if there are several; null if unknown.", ge=0, le=LARGEST
-            ),
-        ]
-        | None
-    )
-    sampling_Hz: (
-        Annotated[
-            float,
-            quantity(
-                "Hz",
-                "Number of samples used per second. If several rows of a file became one sample, their "
-                "medians count. Null: no time was recorded.",
-                ge=0,
-                le=LARGEST,
-            ),
-        ]
-        | None
-    )
-    samples: Annotated[int, Meta(description="Number of samples used, over all ramps.", ge=0, le=10**12)]
+    rate_V_s: Annotated[float, quantity("V/s", ge=0, le=LARGEST)] | None
+    """Rate of the command ramp, the fastest if there are several; null if unknown."""
+    sampling_Hz: Annotated[float, quantity("Hz", ge=0, le=LARGEST)] | None
+    """Number of samples used per second. If several rows of a file became one sample, their medians count. Null: no
+    time was recorded."""
+    samples: Annotated[int, Meta(ge=0, le=10**12)]
+    """Number of samples used, over all ramps."""
 
 
 def conditions_of(rates_V_s: Sequence[float], time_s: np.ndarray) -> RampConditions:

@@ -28,119 +28,77 @@ class TestResult:
 
     __test__ = False  # not a test case, whatever its name
 
-    source: Annotated[str, Meta(description="Recording of the test; the first one if there are several.")]
-    dp_MPa: Annotated[
-        PressureDrop | None, Meta(description="Pressure drop at zero flow; null if none was recorded or declared.")
-    ]
-    dp_from: Annotated[
-        str | None,
-        Meta(
-            description="Origin of the pressure drop: columns of the recordings, such as pP_MPa - pA_MPa, or "
-            "'declared' by --dp or [dp]. Null: the pressure drop is unknown."
-        ),
-    ]
-    u_knee_rising_V: Annotated[
-        Voltage | None, Meta(description="Knee on opening: the straight part of Q/sqrt(dP), extrapolated to zero flow.")
-    ]
+    source: str
+    """Recording of the test; the first one if there are several."""
+    dp_MPa: PressureDrop | None
+    """Pressure drop at zero flow; null if none was recorded or declared."""
+    dp_from: str | None
+    """Origin of the pressure drop: columns of the recordings, such as pP_MPa - pA_MPa, or 'declared' by --dp or [dp].
+    Null: the pressure drop is unknown."""
+    u_knee_rising_V: Voltage | None
+    """Knee on opening: the straight part of Q/sqrt(dP), extrapolated to zero flow."""
     u_knee_rising_se_V: StandardError
-    u_level_rising_V: Annotated[
-        Voltage | None,
-        Meta(description="Level on opening: the command at which the flow reaches the noise level."),
-    ]
+    u_level_rising_V: Voltage | None
+    """Level on opening: the command at which the flow reaches the noise level."""
     u_level_rising_se_V: StandardError
-    u_onset_rising_V: Annotated[
-        Voltage | None,
-        Meta(
-            description="Onset on opening, as far as the meter shows it. It is the first flow above the meter's noise, "
-            "or the tail extrapolated to zero, whichever is lower."
-        ),
-    ]
+    u_onset_rising_V: Voltage | None
+    """Onset on opening, as far as the meter shows it. It is the first flow above the meter's noise, or the tail
+    extrapolated to zero, whichever is lower."""
     u_onset_rising_se_V: StandardError
-    straight_rising: Annotated[
-        LinearRange | None,
-        quantity("1", "Range of flow in which the rising branch is straight, as shares of its largest flow."),
-    ]
-    u_knee_falling_V: Annotated[
-        Voltage | None, Meta(description="Knee on closing: the straight part of Q/sqrt(dP), extrapolated to zero flow.")
-    ]
+    straight_rising: Annotated[LinearRange | None, quantity("1")]
+    """Range of flow in which the rising branch is straight, as shares of its largest flow."""
+    u_knee_falling_V: Voltage | None
+    """Knee on closing: the straight part of Q/sqrt(dP), extrapolated to zero flow."""
     u_knee_falling_se_V: StandardError
-    u_level_falling_V: Annotated[
-        Voltage | None, Meta(description="Level on closing: the command at which the flow reaches the noise level.")
-    ]
+    u_level_falling_V: Voltage | None
+    """Level on closing: the command at which the flow reaches the noise level."""
     u_level_falling_se_V: StandardError
-    u_onset_falling_V: Annotated[
-        Voltage | None, Meta(description="Onset on closing: the command of the last flow that the meter shows.")
-    ]
+    u_onset_falling_V: Voltage | None
+    """Onset on closing: the command of the last flow that the meter shows."""
     u_onset_falling_se_V: StandardError
-    straight_falling: Annotated[
-        LinearRange | None,
-        quantity("1", "Range of flow in which the falling branch is straight, as shares of its largest flow."),
-    ]
-    not_observable: Annotated[
-        Mapping[str, str],
-        Meta(description="Reason for each threshold that the meter can't show, by the threshold's key."),
-    ]
+    straight_falling: Annotated[LinearRange | None, quantity("1")]
+    """Range of flow in which the falling branch is straight, as shares of its largest flow."""
+    not_observable: Mapping[str, str]
+    """Reason for each threshold that the meter can't show, by the threshold's key."""
     u_knee_se_V: Annotated[VoltageError, Meta(description="Larger standard error of the two knees.")] = field(
         init=False
     )
-    u_guard_V: Annotated[
-        Voltage,
-        Meta(
-            description="Threshold that the certificate protects, on the guarded branch. It is the knee or, for a soft "
-            "edge that still passes flow below the knee, the zero of the tail or the fall to the noise "
-            "level."
-        ),
-    ]
-    u_guard_lower_V: Annotated[Voltage, Meta(description="Lower confidence bound of u_guard_V.")]
-    slope_L_min_V: Annotated[FlowGain, Meta(description="Slope of the straight part at the test's pressure drop.")]
-    q_max_L_min: Annotated[Flow, Meta(description="Largest flow, scaled to the test's pressure drop.")]
-    saturates: Annotated[
-        bool, Meta(description="Whether the flow stops growing before full command because the spool reaches its stop.")
-    ]
-    leak_L_min: Annotated[
-        Flow,
-        Meta(
-            description="Leak: flow at zero command that grows with the pressure drop. The knees refer to the flow "
-            "minus the leak, and the bounds allow for its end where the valve opens."
-        ),
-    ]
-    noise_level_L_min: Annotated[
-        Flow,
-        Meta(
-            description="Noise level: a flow below it counts as no flow. It is the largest of the meter's floor, the "
-            "resolution of averages over the dead zone, and 0.5 % of the largest flow or the declared "
-            "level."
-        ),
-    ]
-    zero_flow_L_min: Annotated[
-        Flow | None,
-        Meta(
-            description="Flow at zero command, leak included, that the bound allows if --zero-flow declared one. It is "
-            "the declared flow, or the sum of leak and noise level if that is larger. Null: none was "
-            "declared."
-        ),
-    ]
-    noise_L_min: Annotated[Flow, Meta(description="Standard deviation of the flow noise.")]
-    noise_variance_inflation: Annotated[
-        float,
-        quantity("1", "Variance of a mean flow relative to that under white noise of the same size.", ge=0, le=1e6),
-    ]
-    spool_ripple_V: Annotated[
-        VoltageError,
-        Meta(description="Standard deviation of the spool around its mean motion by stick-slip, as a command."),
-    ]
-    outliers: Annotated[
-        int, Meta(description="Number of samples of the straight part that were excluded as outliers.", ge=0, le=10**12)
-    ]
-    recorded: Annotated[RecordedCurve, Meta(description="Recorded flow over command, reduced to few points.")]
-    ramps: Annotated[tuple[str, ...], Meta(description="Ramps that were pooled in this test.", min_length=1)]
-    left_out: Annotated[
-        tuple[LeftOut, ...],
-        Meta(description="Parts of the recordings that were left out, in these ramps and before them."),
-    ] = ()
-    conditions: Annotated[
-        RampConditions | UnsetType, Meta(description="Recording conditions. Omitted if they were not kept.")
-    ] = UNSET
+    u_guard_V: Voltage
+    """Threshold that the certificate protects, on the guarded branch. It is the knee or, for a soft edge that still
+    passes flow below the knee, the zero of the tail or the fall to the noise level."""
+    u_guard_lower_V: Voltage
+    """Lower confidence bound of u_guard_V."""
+    slope_L_min_V: FlowGain
+    """Slope of the straight part at the test's pressure drop."""
+    q_max_L_min: Flow
+    """Largest flow, scaled to the test's pressure drop."""
+    saturates: bool
+    """Whether the flow stops growing before full command because the spool reaches its stop."""
+    leak_L_min: Flow
+    """Leak: flow at zero command that grows with the pressure drop. The knees refer to the flow minus the leak, and the
+    bounds allow for its end where the valve opens."""
+    noise_level_L_min: Flow
+    """Noise level: a flow below it counts as no flow. It is the largest of the meter's floor, the resolution of
+    averages over the dead zone, and 0.5 % of the largest flow or the declared level."""
+    zero_flow_L_min: Flow | None
+    """Flow at zero command, leak included, that the bound allows if --zero-flow declared one. It is the declared flow,
+    or the sum of leak and noise level if that is larger. Null: none was declared."""
+    noise_L_min: Flow
+    """Standard deviation of the flow noise."""
+    noise_variance_inflation: Annotated[float, quantity("1", ge=0, le=1e6)]
+    """Variance of a mean flow relative to that under white noise of the same size."""
+    spool_ripple_V: VoltageError
+    """Standard deviation of the spool around its mean motion by stick-slip, as a command."""
+    outliers: Annotated[int, Meta(ge=0, le=10**12)]
+    """Number of samples of the straight part that were excluded as outliers."""
+    recorded: RecordedCurve
+    """Recorded flow over command, reduced to few points."""
+    ramps: Annotated[tuple[str, ...], Meta(min_length=1)]
+    """Ramps that were pooled in this test."""
+    left_out: tuple[LeftOut, ...] = ()
+    """Parts of the recordings that were left out, in these ramps and before them."""
+    conditions: RampConditions | UnsetType = UNSET
+    """Recording conditions. Omitted if they were not kept."""
 
     def __post_init__(self) -> None:
         for branch in BRANCHES:

@@ -28,22 +28,11 @@ SAG_STEPS = 8
 class RecordedSamples:
     """Single samples of a branch, for a plot that shows how they scatter: none of them is an average."""
 
-    u_V: Annotated[
-        tuple[Voltage, ...],
-        Meta(
-            description="Commands of the samples in ascending order. The branch is divided into equal steps; the "
-            "sample nearest to each step is kept, whichever ramp it belongs to.",
-            min_length=1,
-            max_length=MOST_SAMPLES,
-            extra_json_schema={"unit": "V"},
-        ),
-    ]
-    q_L_min: Annotated[
-        tuple[SignedFlow, ...],
-        quantity(
-            "L/min", "Flow of each sample as read, corrected for the meter's lag and zero error; a leak is included."
-        ),
-    ]
+    u_V: Annotated[tuple[Voltage, ...], Meta(min_length=1, max_length=MOST_SAMPLES, extra_json_schema={"unit": "V"})]
+    """Commands of the samples in ascending order. The branch is divided into equal steps; the sample nearest to each
+    step is kept, whichever ramp it belongs to."""
+    q_L_min: Annotated[tuple[SignedFlow, ...], quantity("L/min")]
+    """Flow of each sample as read, corrected for the meter's lag and zero error; a leak is included."""
 
     def __post_init__(self) -> None:
         if len(self.u_V) != len(self.q_L_min):
@@ -54,37 +43,18 @@ class RecordedSamples:
 class RecordedBranch:
     """One branch of a test: flow over command, linear between the points."""
 
-    u_V: Annotated[
-        tuple[Voltage, ...],
-        Meta(
-            description="Commands of the points in ascending order.",
-            min_length=2,
-            max_length=MOST_POINTS + 4,
-            extra_json_schema={"unit": "V"},
-        ),
-    ]
-    q_L_min: Annotated[
-        tuple[Flow, ...],
-        quantity("L/min", "Flow at each point, at the actual pressure drop of the bench; a leak is included."),
-    ]
-    u_seen_V: Annotated[
-        Voltage,
-        Meta(
-            description="Command from which the flow exceeds the noise level. Below it the points lie on a straight "
-            "line to the onset, which no reading confirms."
-        ),
-    ]
-    error_L_min: Annotated[
-        Flow,
-        Meta(
-            description="Largest deviation of the piecewise linear curve from the visible recorded flow, averaged over "
-            "0.5 % of full command."
-        ),
-    ]
-    samples: Annotated[
-        RecordedSamples | UnsetType,
-        Meta(description="Selection of single samples, not averaged. Omitted if none were kept."),
-    ] = UNSET
+    u_V: Annotated[tuple[Voltage, ...], Meta(min_length=2, max_length=MOST_POINTS + 4, extra_json_schema={"unit": "V"})]
+    """Commands of the points in ascending order."""
+    q_L_min: Annotated[tuple[Flow, ...], quantity("L/min")]
+    """Flow at each point, at the actual pressure drop of the bench; a leak is included."""
+    u_seen_V: Voltage
+    """Command from which the flow exceeds the noise level. Below it the points lie on a straight line to the onset,
+    which no reading confirms."""
+    error_L_min: Flow
+    """Largest deviation of the piecewise linear curve from the visible recorded flow, averaged over 0.5 % of full
+    command."""
+    samples: RecordedSamples | UnsetType = UNSET
+    """Selection of single samples, not averaged. Omitted if none were kept."""
 
     def __post_init__(self) -> None:
         if len(self.u_V) != len(self.q_L_min):
@@ -113,16 +83,13 @@ class RecordedBranch:
 class RecordedCurve:
     """The recorded characteristic of one test; a branch that was not recorded is null."""
 
-    rising: Annotated[RecordedBranch | None, Meta(description="Opening branch.")]
-    falling: Annotated[RecordedBranch | None, Meta(description="Closing branch.")]
-    dp_at_flow_MPa: Annotated[
-        tuple[PressureDrop, ...] | None,
-        quantity(
-            "MPa",
-            "Pressure drop of the bench at equally spaced flows from zero to the largest point. It shows "
-            "how the supply sags. Null: no pressure drop was recorded.",
-        ),
-    ]
+    rising: RecordedBranch | None
+    """Opening branch."""
+    falling: RecordedBranch | None
+    """Closing branch."""
+    dp_at_flow_MPa: Annotated[tuple[PressureDrop, ...] | None, quantity("MPa")]
+    """Pressure drop of the bench at equally spaced flows from zero to the largest point. It shows how the supply sags.
+    Null: no pressure drop was recorded."""
 
     def __post_init__(self) -> None:
         if self.rising is None and self.falling is None:

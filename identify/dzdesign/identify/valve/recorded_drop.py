@@ -19,14 +19,10 @@ Label = Annotated[str, Meta(max_length=10_000)]
 class DropColumns:
     """Columns that make a pressure drop: one that holds it, or two pressures, the second one subtracted."""
 
-    quantities: Annotated[
-        tuple[DropQuantity, ...],
-        Meta(description="Quantities, such as pP and pA; the second one is subtracted.", min_length=1, max_length=2),
-    ]
-    labels: Annotated[
-        tuple[Label, ...],
-        Meta(description="Labels of these columns in the recordings.", min_length=1, max_length=2),
-    ]
+    quantities: Annotated[tuple[DropQuantity, ...], Meta(min_length=1, max_length=2)]
+    """Quantities, such as pP and pA; the second one is subtracted."""
+    labels: Annotated[tuple[Label, ...], Meta(min_length=1, max_length=2)]
+    """Labels of these columns in the recordings."""
 
     def __post_init__(self) -> None:
         if len(self.quantities) != len(self.labels) or (len(self.labels) == 1) != (self.quantities == ("dP",)):
@@ -59,17 +55,11 @@ def drop_in_words(columns: Sequence[DropColumns], sign: DropSign = 1) -> str:
 class RecordedDrop:
     """Recorded pressure drop of one side."""
 
-    columns: Annotated[
-        tuple[DropColumns, ...],
-        Meta(description="Columns that make the pressure drop; several if the recordings differ.", min_length=1),
-    ]
-    sign: Annotated[
-        DropSign,
-        Meta(
-            description="Sign of the recorded pressure drop at this side's commands. -1: it was recorded below zero, "
-            "so the pressure of the second column is the higher one."
-        ),
-    ]
+    columns: Annotated[tuple[DropColumns, ...], Meta(min_length=1)]
+    """Columns that make the pressure drop; several if the recordings differ."""
+    sign: DropSign
+    """Sign of the recorded pressure drop at this side's commands. -1: it was recorded below zero, so the pressure of
+    the second column is the higher one."""
 
     @property
     def ways(self) -> set[tuple[DropQuantity, ...]]:

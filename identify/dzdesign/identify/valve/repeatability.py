@@ -3,8 +3,6 @@
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from msgspec import Meta
-
 from dzdesign.core.artefact_types import RuleError, quantity
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.identify.valve.quantity_types import Voltage, VoltageError
@@ -17,32 +15,19 @@ NoDrift = Literal["", "one pressure drop", "order unknown", "order of pressure"]
 class Repeatability:
     """Scatter of the guarded threshold from ramp to ramp, and its drift through the series of ramps."""
 
-    sd_V: Annotated[VoltageError, Meta(description="Standard deviation of the threshold from ramp to ramp.")]
-    origin: Annotated[
-        Origin,
-        Meta(
-            description="Origin of the standard deviation: measured on repeats, declared by --repeatability, or "
-            "assumed by dzdesign."
-        ),
-    ]
-    degrees_of_freedom: (
-        Annotated[
-            float,
-            quantity(
-                "1", "Degrees of freedom of a measured standard deviation; null if it was not measured.", gt=0, le=1e9
-            ),
-        ]
-        | None
-    )
-    drift_V: Annotated[
-        Voltage | None,
-        Meta(
-            description="Change of the threshold from the first ramp of the series to the last; null if the model has "
-            "no drift. The thresholds refer to the middle of the series, and the bounds hold at both ends."
-        ),
-    ]
-    drift_se_V: Annotated[VoltageError | None, Meta(description="Standard error of drift_V.")]
-    no_drift: Annotated[NoDrift, Meta(description="Reason why the model has no drift; empty if it has one.")]
+    sd_V: VoltageError
+    """Standard deviation of the threshold from ramp to ramp."""
+    origin: Origin
+    """Origin of the standard deviation: measured on repeats, declared by --repeatability, or assumed by dzdesign."""
+    degrees_of_freedom: Annotated[float, quantity("1", gt=0, le=1e9)] | None
+    """Degrees of freedom of a measured standard deviation; null if it was not measured."""
+    drift_V: Voltage | None
+    """Change of the threshold from the first ramp of the series to the last; null if the model has no drift. The
+    thresholds refer to the middle of the series, and the bounds hold at both ends."""
+    drift_se_V: VoltageError | None
+    """Standard error of drift_V."""
+    no_drift: NoDrift
+    """Reason why the model has no drift; empty if it has one."""
 
     def __post_init__(self) -> None:
         if (self.origin == "repeats") != (self.degrees_of_freedom is not None):

@@ -37,140 +37,94 @@ DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
 class Reference:
     """The reference point of the law."""
 
-    dp_MPa: Annotated[
-        PressureDrop | None, Meta(description="Reference pressure drop dP0; null if the ramp test has no pressure.")
-    ]
-    u_min_V: Annotated[
-        Voltage, Meta(description="Identified threshold u_min0 at dP0, on the branch that is guarded by default.")
-    ]
-    u_min_se_V: Annotated[VoltageError, Meta(description="Standard error of u_min0.")]
+    dp_MPa: PressureDrop | None
+    """Reference pressure drop dP0; null if the ramp test has no pressure."""
+    u_min_V: Voltage
+    """Identified threshold u_min0 at dP0, on the branch that is guarded by default."""
+    u_min_se_V: VoltageError
+    """Standard error of u_min0."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BetaNodes:
     """Identified beta(dP) of Eq. (5), on the branch that is guarded by default; without nodes if dP is unknown."""
 
-    dp_MPa: Annotated[
-        tuple[PressureDrop, ...], quantity("MPa", "Pressure drops of the nodes, which are those of the tests.")
-    ]
-    beta: Annotated[
-        tuple[IdentifiedRatio, ...],
-        quantity("1", "Threshold at each node relative to that at dP0: u_min(dP) / u_min0."),
-    ]
-    beta_se: Annotated[tuple[RatioError, ...], quantity("1", "Standard error of beta at each node; 0 at dP0.")]
+    dp_MPa: Annotated[tuple[PressureDrop, ...], quantity("MPa")]
+    """Pressure drops of the nodes, which are those of the tests."""
+    beta: Annotated[tuple[IdentifiedRatio, ...], quantity("1")]
+    """Threshold at each node relative to that at dP0: u_min(dP) / u_min0."""
+    beta_se: Annotated[tuple[RatioError, ...], quantity("1")]
+    """Standard error of beta at each node; 0 at dP0."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BoundsBasis:
     """Basis of the lower bounds."""
 
-    confidence: Annotated[
-        float, quantity("1", "Joint confidence level of all bounds of a guard.", ge=0.5, le=1)
-    ]
-    guard: Annotated[
-        Guard,
-        Meta(
-            description="Threshold that is protected by default: the safest one that was recorded. `design --guard` "
-            "can select another."
-        ),
-    ]
-    level_L_min: Annotated[
-        Flow,
-        Meta(
-            description="Largest noise level of the tests; a flow below it counts as no flow."
-        ),
-    ]
-    zero_flow_L_min: Annotated[
-        Flow | None,
-        Meta(description="Flow at zero command, leak included, that --zero-flow declared as allowed; null if none was "
-            "declared."),
-    ]
-    unseen_below_L_min: Annotated[
-        Flow,
-        Meta(
-            description="Flow below which nothing is known at the guard's bounds. It is level_L_min. It is less if "
-            "low-flow readings at or above the guarded threshold of every test show that no more flows. It is more if "
-            "the readings at rest may hide a larger zero error of the meter."
-        ),
-    ]
-    repeatability: Annotated[Repeatability, Meta(description="Differences from ramp to ramp.")]
+    confidence: Annotated[float, quantity("1", ge=0.5, le=1)]
+    """Joint confidence level of all bounds of a guard."""
+    guard: Guard
+    """Threshold that is protected by default: the safest one that was recorded. `design --guard` can select another."""
+    level_L_min: Flow
+    """Largest noise level of the tests; a flow below it counts as no flow."""
+    zero_flow_L_min: Flow | None
+    """Flow at zero command, leak included, that --zero-flow declared as allowed; null if none was declared."""
+    unseen_below_L_min: Flow
+    """Flow below which nothing is known at the guard's bounds. It is level_L_min. It is less if low-flow readings at or
+    above the guarded threshold of every test show that no more flows. It is more if the readings at rest may hide a
+    larger zero error of the meter."""
+    repeatability: Repeatability
+    """Differences from ramp to ramp."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SideModel:
     """One side of the valve, identified separately. The negative side counts commands and flows from zero downwards."""
 
-    tests: Annotated[
-        tuple[TestResult, ...], Meta(description="Ramp tests in ascending order of pressure drop.", min_length=1)
-    ]
-    recorded_drop: Annotated[
-        RecordedDrop | None,
-        Meta(description="Origin and sign of the recorded pressure drop; null if it was declared or is unknown."),
-    ]
-    reference: Annotated[Reference, Meta(description="Reference point of the law.")]
-    k_x_max_over_u_max: Annotated[
-        float,
-        quantity(
-            "1",
-            "Command range from the knee to full stroke, over full command (k x_max / u_max of Eq. 18).",
-            ge=1e-3,
-            le=1e3,
-        ),
-    ]
-    k_x_max_over_u_max_se: Annotated[float, quantity("1", "Standard error of k_x_max_over_u_max.", ge=0, le=1e3)]
-    k_V_mm: Annotated[float, quantity("V/mm", "Constant k of Eq. (11), if --x-max was given.", ge=0, le=1e9)] | None
-    k_V_mm_se: Annotated[float, quantity("V/mm", "Standard error of k_V_mm.", ge=0, le=1e9)] | None
-    trend: Annotated[
-        Direction | None,
-        Meta(
-            description="Trend of the guarded threshold over the pressure drop; null if fewer than two pressure drops "
-            "were tested."
-        ),
-    ]
-    trend_change_V: Annotated[
-        Voltage | None,
-        Meta(description="Change of the guarded threshold over the tested range, by a straight-line fit."),
-    ]
-    trend_change_se_V: Annotated[VoltageError | None, Meta(description="Standard error of trend_change_V.")]
-    trend_p: Annotated[
-        Probability | None,
-        Meta(description="Probability of a change at least this large if the threshold were constant."),
-    ]
+    tests: Annotated[tuple[TestResult, ...], Meta(min_length=1)]
+    """Ramp tests in ascending order of pressure drop."""
+    recorded_drop: RecordedDrop | None
+    """Origin and sign of the recorded pressure drop; null if it was declared or is unknown."""
+    reference: Reference
+    """Reference point of the law."""
+    k_x_max_over_u_max: Annotated[float, quantity("1", ge=1e-3, le=1e3)]
+    """Command range from the knee to full stroke, over full command (k x_max / u_max of Eq. 18)."""
+    k_x_max_over_u_max_se: Annotated[float, quantity("1", ge=0, le=1e3)]
+    """Standard error of k_x_max_over_u_max."""
+    k_V_mm: Annotated[float, quantity("V/mm", ge=0, le=1e9)] | None
+    """Constant k of Eq. (11), if --x-max was given."""
+    k_V_mm_se: Annotated[float, quantity("V/mm", ge=0, le=1e9)] | None
+    """Standard error of k_V_mm."""
+    trend: Direction | None
+    """Trend of the guarded threshold over the pressure drop; null if fewer than two pressure drops were tested."""
+    trend_change_V: Voltage | None
+    """Change of the guarded threshold over the tested range, by a straight-line fit."""
+    trend_change_se_V: VoltageError | None
+    """Standard error of trend_change_V."""
+    trend_p: Probability | None
+    """Probability of a change at least this large if the threshold were constant."""
     beta: Annotated[BetaNodes, Meta(description="Identified beta(dP). It is an estimate, not a bound.")] = field(
         init=False
     )
-    valid_dp_MPa: Annotated[
-        tuple[PressureDrop, PressureDrop] | None,
-        quantity("MPa", "Tested interval of the pressure drop; nothing is certified outside it."),
-    ] = field(init=False)
-    certificate: Annotated[BoundsBasis, Meta(description="Basis of the lower bounds.")]
-    low_flow: Annotated[
-        tuple[LowFlow, ...],
-        Meta(description="Flows measured by hand below the meter's floor, by --low-flow."),
-    ]
-    active_constraints: Annotated[
-        tuple[str, ...], Meta(description="Constraints that are active in the fits, in words.")
-    ]
+    valid_dp_MPa: Annotated[tuple[PressureDrop, PressureDrop] | None, quantity("MPa")] = field(init=False)
+    """Tested interval of the pressure drop; nothing is certified outside it."""
+    certificate: BoundsBasis
+    """Basis of the lower bounds."""
+    low_flow: tuple[LowFlow, ...]
+    """Flows measured by hand below the meter's floor, by --low-flow."""
+    active_constraints: tuple[str, ...]
+    """Constraints that are active in the fits, in words."""
     identified: Annotated[
-        Mapping[str, IdentifiedCurve],
-        Meta(
-            description="Identified threshold (knee) of each recorded branch with its error. It is an estimate, not a "
-            "safe bound.",
-            extra_json_schema={"propertyNames": {"enum": list(IDENTIFIED)}},
-        ),
+        Mapping[str, IdentifiedCurve], Meta(extra_json_schema={"propertyNames": {"enum": list(IDENTIFIED)}})
     ]
+    """Identified threshold (knee) of each recorded branch with its error. It is an estimate, not a safe bound."""
     certified: Annotated[
-        Mapping[str, CertifiedCurve],
-        Meta(
-            description="Safe bounds: one curve for each threshold that the recordings allow, which are closing, "
-            "opening and the mean of both. The error of the mean assumes the least favourable covariance.",
-            extra_json_schema={"propertyNames": {"enum": list(GUARDS)}},
-        ),
+        Mapping[str, CertifiedCurve], Meta(extra_json_schema={"propertyNames": {"enum": list(GUARDS)}})
     ]
-    opening_curve: Annotated[
-        OpeningCurve | None,
-        Meta(description="Threshold of useful flow on opening; null without a rising branch or without pressure."),
-    ]
+    """Safe bounds: one curve for each threshold that the recordings allow, which are closing, opening and the mean of
+    both. The error of the mean assumes the least favourable covariance."""
+    opening_curve: OpeningCurve | None
+    """Threshold of useful flow on opening; null without a rising branch or without pressure."""
 
     def __post_init__(self) -> None:
         if self.trend is None and len(self.tests) != 1:

@@ -19,14 +19,8 @@ class StatedOptions:
     texts: Annotated[Mapping[Name, Words], Meta(description="Options with one text value, such as meter_lag.")] = field(
         default_factory=dict
     )
-    tables: Annotated[
-        Mapping[Name, Mapping[Name, Words]],
-        Meta(description="Options given as a table, such as columns, or dp by the recording's name."),
-    ] = field(default_factory=dict)
-    lists: Annotated[
-        Mapping[Name, tuple[Words, ...]],
-        Meta(
-            description="Options with several text values. The list of `order` holds the recordings in the order in "
-            "which they were taken."
-        ),
-    ] = field(default_factory=dict)
+    tables: Mapping[Name, Mapping[Name, Words]] = field(default_factory=dict)
+    """Options given as a table, such as columns, or dp by the recording's name."""
+    lists: Mapping[Name, tuple[Words, ...]] = field(default_factory=dict)
+    """Options with several text values. The list of `order` holds the recordings in the order in which they were
+    taken."""
