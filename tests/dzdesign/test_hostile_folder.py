@@ -147,7 +147,7 @@ def worked(folder):
     for words in OF_A_DAY:
         words = [word.replace("{out}", str(out)).replace("{lot}", str(lot)) for word in words]
         done = subprocess.run(
-            [PROGRAM, *words], cwd=folder.place, env=environment, capture_output=True, text=True, timeout=120,
+            [PROGRAM, *words], cwd=folder.place, env=environment, capture_output=True, text=True, timeout=900,
             stdin=subprocess.DEVNULL, check=False,
         )  # fmt: skip
         said.append((words[0], done.returncode, done.stdout + done.stderr))
