@@ -162,9 +162,10 @@ def test_what_stands_around_the_stages_writes_the_bytes_of_the_commands(tmp_path
     compared = {"limits": {"dead_zone_opening": "60 %"}, "meter_lag": "0.1 s", "output": "api_assessment.json"}
     assert api.assess("lot/V1/*.gz", "after/*.gz", **compared).holds
     pairs.append(("assessment.json", "api_assessment.json"))
-    assert main(["batch", "lot", "--meter-lag", "0.1 s", "--guard", "mean", "--jobs", "1", "-o", "done"]) == 0
+    choices = ["--meter-lag", "0.1 s", "--guard", "mean", "--curve", "line", "--jobs", "1"]
+    assert main(["batch", "lot", *choices, "-o", "done"]) == 0
     capsys.readouterr()
-    said = {"meter_lag": "0.1 s", "guard": "mean", "jobs": 1}
+    said = {"meter_lag": "0.1 s", "guard": "mean", "curve": "line", "jobs": 1}
     summary = api.batch(Path("lot"), output=Path("api_done"), **said)
     assert summary.calibrated == summary.valves == 1
     pairs += [(f"done/{name}", f"api_done/{name}") for name in ("batch.json", "valves.csv", "report.html")]
