@@ -283,9 +283,10 @@ def test_what_one_setting_costs(made):
     assert min(extra, key=extra.get) in common["binding"]
     lowest = min(float(row["offset_V"]) for row in table)
     # In per cent of command: to the knee, over the gain that is left, about 0.46; a valve's own law has a transition.
+    # That is of dP0 alone; elsewhere the bound of a valve may lie further below its knee.
     for row in table:
         left = 10 * (float(row["knee_opening_V"]) - lowest) / 0.46 - float(row["dead_zone_opening_percent"])
-        assert extra[row["name"]] == pytest.approx(left, abs=1.2)
+        assert extra[row["name"]] == pytest.approx(left, abs=1.6)
     assert max(extra.values()) > 2
 
 
@@ -432,7 +433,7 @@ def test_a_valve_that_lacks_a_pressure_is_named_with_the_range_without_it(lot, t
         f"coarse,{ramps}/V0007/{low};{ramps}/V0007/{high}\n"
     )
     out = tmp_path / "out"
-    assert main(["batch", str(listing), "-o", str(out), "--jobs", "1", *OPTIONS]) == 0
+    assert main(["batch", str(listing), "-o", str(out), "--jobs", "1", *OPTIONS, "--curve", "line"]) == 0
     said = " ".join(capsys.readouterr().out.split())
     words = (
         "short was not tested at 5 MPa, as the lot was: so the lot setting holds for all from 1 to 2.5 MPa, and "

@@ -10,6 +10,7 @@ from stand_in_flow import LIMIT, RECORDINGS, largest_miss, misses, plant_bins, r
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.identify.identification import identify
+from dzdesign.identify.options import IdentifyOptions
 from dzdesign.verify.closed_loop import loop as loop_module
 from dzdesign.verify.closed_loop.loop import ClosedLoop, RampSequence
 from dzdesign.verify.closed_loop.loop_checks import no_flow_at_zero, plant_is_the_valve, stand_in_is_the_recording
@@ -331,7 +332,7 @@ def leaking_valve():
         u, dp = (np.concatenate([[a[0]] * 1000, a, [a[-1]] * 1000]) for a in (ramp.u, ramp.dp))
         return replace(ramp, time=np.arange(q.size) / 50.0, u=u, dp=dp, q=q)
 
-    return identify([leaking(1.0), leaking(3.0)])
+    return identify([leaking(1.0), leaking(3.0)], IdentifyOptions(curve="line"))
 
 
 def test_a_leak_that_was_seen_flows_at_zero_command(leaking_valve, direct):

@@ -37,7 +37,7 @@ from dzdesign.command_line.cli import main
 from dzdesign.verify.closed_loop import against_cvodes
 against_cvodes.WINDOW_S = 0.1
 ramps = sys.argv[1:]
-assert main(["identify", *ramps, "-o", "valve.json"]) == 0
+assert main(["identify", *ramps, "--curve", "line", "-o", "valve.json"]) == 0
 assert main(["design", "valve.json", "-o", "compensator.json"]) == 0
 assert main(["codegen", "compensator.json", "--target", "host", "-o", "firmware"]) == 0
 assert main(["verify", "firmware", "-o", "evidence"]) in (0, 1)
@@ -103,7 +103,7 @@ QUICK = RampSequence(rest=1.0, ramp=10.0, top=0.5)
 @pytest.fixture(scope="module")
 def compensator():
     worn = replace(WORN, repeats=1)
-    options = IdentifyOptions(meter_lag=0.0, zero_flow=0.35 * L_MIN, repeatability=5e-4)
+    options = IdentifyOptions(meter_lag=0.0, zero_flow=0.35 * L_MIN, repeatability=5e-4, curve="monotone")
     return design(identify(recordings(worn, pressures=(1.0, 3.0, 5.0)), options))
 
 

@@ -42,8 +42,8 @@ class PremiseCheck:
 
     premise: Premise
     """Premise. line: the threshold is a straight line over the pressure drop. smooth: it has at most one kink, or a
-    smooth bend, between two tests, no stronger than the tests show; or its second divided difference is at most a
-    declared M. monotone: it only rises or only falls."""
+    smooth bend, between two tests, no stronger than the tests show. If an M was declared, its second divided difference
+    is at most M. monotone: it only rises or only falls."""
     lack_of_fit_p: Probability | None
     """Probability of tests that contradict the premise at least as much as these if it were true, given noise and
     scatter. The premise is rejected below 0.01. Null: the tests can't contradict the premise."""
