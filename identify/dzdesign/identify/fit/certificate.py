@@ -173,6 +173,7 @@ def prove(curves: CurveClass, data: DataSet, rows: Sequence[np.ndarray]) -> Proo
         point = np.zeros(left.shape[1])
         point[at] = 1.0
         found = nnls(left[of_point].T, point)[0] if of_point.size else np.zeros(0)
+        found = np.where(found > SMALLEST, found, 0.0)  # else the rows that are named would follow from rounding
         left_over = float(np.sum(np.abs(found @ left[of_point] - point)))
         if left_over > PROOF:
             raise InputError(f"the multipliers of a certified bound miss their proof by {left_over:.1g}")
@@ -231,7 +232,10 @@ def contrasts(scatter: Scatter, state: float) -> np.ndarray:
     clock = [model.ramps.clock] if model.drift and model.ramps.clock is not None else []
     at = np.array([[1, each, *([state] * len(clock))] for each in (dp.min(), dp.mean(), dp.max())])
     rows.append(at @ np.linalg.pinv(np.column_stack([np.ones(dp.size), dp, *clock])))
-    return np.vstack(rows)
+    every = np.vstack(rows)
+    # Of two tests the line's ends are the tests themselves: which of two equal rows proves a bound is no one's choice.
+    new = [not np.any(np.all(np.abs(every[:row] - every[row]) < SMALLEST, axis=1)) for row in range(len(every))]
+    return every[new]
 
 
 def states_of(scatter: Scatter) -> tuple[float, ...]:

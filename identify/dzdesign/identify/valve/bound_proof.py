@@ -218,7 +218,7 @@ class BoundProof:
                     state=proof.state,
                     direction=-1 if proof.direction < 0 else 1 if proof.direction > 0 else 0,
                     multipliers=tuple(
-                        " ".join(f"{row}:{value:.6g}" for row, value in zip(*each, strict=True))
+                        " ".join(f"{row}:{value:.10g}" for row, value in zip(*each, strict=True))
                         for each in zip(proof.rows, proof.multipliers, strict=True)
                     ),
                 )
