@@ -57,7 +57,7 @@ def api_bytes(valve):
 
 
 #: Of a valve.json: all that is a threshold or a bound of it, not an error.
-THRESHOLDS = ("u_knee", "u_level", "u_onset", "u_guard", "u_min", "u_threshold", "u_lower", "offset_V", "u_V")
+THRESHOLDS = ("u_knee", "u_level", "u_onset", "u_guard", "u_min", "u_threshold", "u_lower", "bound_V", "offset_V", "u_V")
 
 
 def raised(document, volts=0.3):
@@ -67,6 +67,8 @@ def raised(document, volts=0.3):
             _raise(place, volts)
         for curve in side["certified"].values():
             _raise(curve["above"], volts)
+            for ramp in curve["proof"]["ramps"]:
+                _raise(ramp, volts)
         _raise(side["opening_curve"], volts)
         for curve in side["identified"].values():
             row = curve["beta"].index(1.0)
@@ -210,7 +212,7 @@ class TestOptionsOfEveryKind:
         for place, name in zip(places, (NAMES[0], NAMES[3]), strict=True):
             place.parent.mkdir()
             shutil.copy(ramps / name, place)
-        valve = api.identify(places)
+        valve = api.identify(places, curve="line")
         assert [each.source for each in valve.made_from] == ["a/ramp.csv.gz", "b/ramp.csv.gz"]
         assert tried(valve, [ramps / NAMES[3], ramps / NAMES[0]]).holds
 

@@ -40,6 +40,7 @@ INCREASING_PERCENT = (1e-3, 100.0)
 #: What the paper does not state and is taken for granted here.
 ASSUMPTIONS = (
     "hysteresis: none, as the paper shows no closing branch; and no stop",
+    "threshold between the two tested pressure drops: it only falls",
     f"second valve: its other pressure drop is {paper.DROP_ASSUMED.removeprefix('at ')}",
     "oil of Fig. 22: " + ", ".join(f"{oil.temperature_C:g}" for oil in OILS) + " °C, a mineral oil of 46 mm²/s",
     f"step of Fig. 8: at {DP0_MPA} MPa, with the default plant's dynamics",
