@@ -139,12 +139,12 @@ def test_what_the_sweeps_cannot_tell_of_a_play_is_said_where_it_is_recommended(e
 
 
 def test_the_dead_zone_between_the_tests_counts():
-    """Three tests: M is large, and between two of them the offset lies lower than at both."""
+    """Of 100 mV/MPa² the bound lies 50 mV below the chord in the middle of two tests, lower than at both."""
     ramps = [
         synthetic_ramp(dp, Truth(knee_rising=5.6 - 0.06 * dp + 0.002 * dp**2, slope=4 * dp**0.5, noise=0.02), seed=row)
         for row, dp in enumerate((1.0, 3.0, 5.0))
     ]
-    valve = identify(ramps, IdentifyOptions(meter_lag=0.0, curve="smooth"))
+    valve = identify(ramps, IdentifyOptions(meter_lag=0.0, curvature=1e-13))
     off = choices(valve, transition="off")[0]
     made_off = designed(valve, transition="off")
     at_tests = max(remaining_dead_zone(made_off, test)["opening"] for test in valve.positive.tests)

@@ -57,7 +57,9 @@ def api_bytes(valve):
 
 
 #: Of a valve.json: all that is a threshold or a bound of it, not an error.
-THRESHOLDS = ("u_knee", "u_level", "u_onset", "u_guard", "u_min", "u_threshold", "u_lower", "bound_V", "offset_V", "u_V")
+THRESHOLDS = (
+    "u_knee", "u_level", "u_onset", "u_guard", "u_min", "u_threshold", "u_lower", "bound_V", "offset_V", "u_V"
+)  # fmt: skip
 
 
 def raised(document, volts=0.3):

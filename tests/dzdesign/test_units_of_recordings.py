@@ -30,6 +30,8 @@ COMPUTED = re.compile(r"\d\s?(mV|V|MPa|L/min)\b")
 COLUMNS = "u=set (mA):4..20 mA = 0..10 V"
 BIPOLAR = "u=set (mA):4..20 mA = -10..10 V"
 LAG = ("--meter-lag", "0 s +- 0.02 s")
+#: What two tested pressure drops need.
+LINE = ("--curve", "line")
 #: The bench's truth on opening and closing, in mA of 4..20 mA = 0..10 V.
 OPENS, CLOSES = 4 + 1.6 * 4.66, 4 + 1.6 * 4.54
 
@@ -73,7 +75,7 @@ def ramps(folder):
 
 @pytest.fixture(scope="module")
 def printed(folder, ramps):
-    status, text = run("identify", *ramps, "--columns", COLUMNS, *LAG, "-o", folder / "valve.json")
+    status, text = run("identify", *ramps, "--columns", COLUMNS, *LAG, *LINE, "-o", folder / "valve.json")
     assert status == 0, text
     return text
 
@@ -124,7 +126,7 @@ def test_the_firmware_speaks_in_them(folder):
         write_ramp(folder, f"percent_{dp:g}.csv", dp, int(10 * dp), scale=lambda u: 10 * u, label="set (%)")
         for dp in (1.0, 4.0)
     ]
-    words = ["identify", *ramps, "--columns", "u=set (%)", *LAG, "-o", folder / "percent.json"]
+    words = ["identify", *ramps, "--columns", "u=set (%)", *LAG, *LINE, "-o", folder / "percent.json"]
     status, text = run(*words)
     assert status == 0 and not numbers_as_computed(text), text
     compensator = folder / "for_firmware.json"

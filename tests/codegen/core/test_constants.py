@@ -94,5 +94,5 @@ def test_the_engineering_values_are_those_of_the_numbers():
     assert f": u_min0 = {10 * float(side.u_min0_over_u_max):.6f} V," in found["offset"]
     assert f": k x_max/u_max - 1 = {float(side.drive_range_over_u_max) - 1:.6f}," in found["slope"]
     assert ": 1.000000 (" in found["linear"]
-    assert f": beta {min(side.beta) / 32768:.6f} to 1.000000," in found["nodes"]
+    assert f": beta {min(side.beta) / 32768:.6f} to {max(side.beta) / 32768:.6f}," in found["nodes"]
     assert f"/* {64 * 20 / 3058:.3f} MPa: beta " in made.files[VALVE]

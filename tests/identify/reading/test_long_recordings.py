@@ -72,7 +72,8 @@ def test_thinning_moves_no_knee(name, monkeypatch, wording):
     few = identify([thinned(test)], options)
     (found,) = few.positive.tests
     for branch in ("u_knee_rising_V", "u_knee_falling_V"):
-        assert abs(getattr(found, branch) - getattr(full, branch)) < max(full.u_knee_se_V, 1e-4), branch
+        errors = np.hypot(full.u_knee_se_V, found.u_knee_se_V)  # of two lines, of which one has a ninth of the samples
+        assert abs(getattr(found, branch) - getattr(full, branch)) < max(errors, 1e-4), branch
     assert 0.5 * full.u_knee_se_V < found.u_knee_se_V < 2 * full.u_knee_se_V
     assert found.q_max_L_min == pytest.approx(full.q_max_L_min, rel=2e-3)
     (warning,) = [warning for warning in few.warnings if warning.code == "thinned"]

@@ -168,14 +168,12 @@ def called_ten_times_better(valve):
     """Return a valve whose certified bound is moved up by nine tenths of its least distance to the threshold."""
     curve = valve.positive.certified["closing"]
     by = 0.9 * min(u - low for u, low in zip(curve.u_threshold_V, curve.u_lower_V, strict=True))
-    above = curve.above and replace(
-        curve.above,
-        band_V=tuple(band - by for band in curve.above.band_V),
-        u_lower_V=tuple(low + by for low in curve.above.u_lower_V),
-    )
+    above = curve.above and replace(curve.above, u_lower_V=tuple(low + by for low in curve.above.u_lower_V))
+    proof = replace(curve.proof, ramps=tuple(replace(ramp, u_V=ramp.u_V + by) for ramp in curve.proof.ramps))
     moved = replace(
-        curve, above=above, u_lower_V=tuple(low + by for low in curve.u_lower_V),
-        offset_V=tuple(low + by for low in curve.offset_V), u_min0_V=curve.u_min0_V + by,
+        curve, above=above, proof=proof, u_lower_V=tuple(low + by for low in curve.u_lower_V),
+        bound_V=tuple(low + by for low in curve.bound_V), offset_V=tuple(low + by for low in curve.offset_V),
+        u_min0_V=curve.u_min0_V + by,
     )  # fmt: skip
     certified = {**valve.positive.certified, "closing": moved}
     tests = tuple(replace(each, u_guard_lower_V=each.u_guard_lower_V + by) for each in valve.positive.tests)

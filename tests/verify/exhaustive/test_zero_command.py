@@ -65,7 +65,9 @@ def test_a_seeded_fault_is_found(drawn, fault):
     compensator, exact, found, at_zero, bounds = drawn
     higher = 0
     if fault == "sags deeper":
-        bounds = replace(bounds, curvature_V_MPa2=tuple(bend + 0.05 for bend in bounds.curvature_V_MPa2))
+        first, last = bounds.dp_MPa[0], bounds.dp_MPa[-1]
+        sag = [0.025 * (dp - first) * (last - dp) for dp in bounds.dp_MPa]
+        bounds = replace(bounds, u_lower_V=tuple(np.subtract(bounds.u_lower_V, sag).tolist()))
     elif fault == "a test lower":
         lower = list(bounds.u_lower_V)
         lower[2] -= 0.02

@@ -13,6 +13,7 @@ independent of it, is integrated.
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -32,6 +33,8 @@ TOGETHER = 8
 #: Largest error of a proof, V per V by which thresholds differ: it is taken off the offset; multipliers that are
 #: rounding; and the slack, mV, below which a row may hold with equality.
 PROOF, SMALLEST, SLACK = 1e-6, 1e-9, 1e-5
+#: Times the rows that the multipliers are solved for in at most.
+ROUNDS = 100
 #: Solvers, tried in turn: tight tolerances may leave the first in numerical difficulties. Whichever answers, its
 #: multipliers are solved for once more and prove themselves, so that a poor answer costs an offset and no safety.
 SOLVERS: tuple[tuple[str, dict[str, float]], ...] = (
@@ -172,7 +175,10 @@ def prove(curves: CurveClass, data: DataSet, rows: Sequence[np.ndarray]) -> Proo
     for at, of_point in enumerate(rows):
         point = np.zeros(left.shape[1])
         point[at] = 1.0
-        found = nnls(left[of_point].T, point)[0] if of_point.size else np.zeros(0)
+        found = np.zeros(of_point.size)
+        if of_point.size:
+            with suppress(RuntimeError):  # of many equal rows it may go round: then they prove nothing, which is said
+                found = nnls(left[of_point].T, point, maxiter=ROUNDS * of_point.size)[0]
         found = np.where(found > SMALLEST, found, 0.0)  # else the rows that are named would follow from rounding
         left_over = float(np.sum(np.abs(found @ left[of_point] - point)))
         if left_over > PROOF:

@@ -50,8 +50,8 @@ class RampSetAside:
 
     source: Annotated[str, Meta(description="File of the ramp, and its number and times if the file has several.")]
     u_V: Annotated[Voltage, Meta(description="Guarded threshold by this ramp.")]
-    distance_V: Annotated[Voltage, Meta(description="Its distance from where the other ramps put it.")]
-    deviations: Annotated[Deviations, Meta(description="That distance in standard deviations of such a distance.")]
+    distance_V: Annotated[Voltage, Meta(description="Distance of this threshold from where the other ramps put it.")]
+    deviations: Annotated[Deviations, Meta(description="Distance in standard deviations of such a distance.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,9 +99,9 @@ class BoundProof:
     roof: Deviations | None
     """Standard deviations from the sums of the ramps to their roofs; null if nothing is certified between the tests."""
     floor_unlike: Deviations | None
-    """The same at the knot that scatters more."""
+    """The roof at the knot that scatters more."""
     roof_unlike: Deviations | None
-    """The same at the knot that scatters more."""
+    """The roof at the knot that scatters more."""
     declared: Literal["line", "smooth", "monotone"] | None
     """Premise that was declared; null if the bends were estimated, or nothing is between tests."""
     curvature_V_MPa2: SecondDifference | None
