@@ -109,7 +109,7 @@ def test_a_command_that_is_given_a_hostile_thing(command, folder, tmp_path, monk
 #: Commands of a working day, in the hostile folder itself; `{out}` is the folder of the outputs.
 OF_A_DAY = (
     ("init", *map(str, RAMPS), "-o", "{out}/dzdesign.toml"),
-    ("identify", *map(str, RAMPS), "-o", "{out}/valve.json", "--plots", "{out}/plots",
+    ("identify", *map(str, RAMPS), "--curve", "line", "-o", "{out}/valve.json", "--plots", "{out}/plots",
      *(word for key, text in RECORD.items() for word in ("--record", f"{key} = {text}"))),
     ("design", "{out}/valve.json", "-o", "{out}/compensator.json"),
     ("codegen", "{out}/compensator.json", "--target", "f28335", "-o", "{out}/firmware"),

@@ -106,7 +106,7 @@ def test_a_result_that_dzdesign_refuses_itself_is_its_own_fault(tmp_path, monkey
 
     monkeypatch.setattr(AboveTests, "check", refuse)
     ramps = [str(RAMPS / f"ramp_dP{dp}_1.csv.gz") for dp in (1, 5)]
-    assert main(["identify", *ramps, "-o", str(tmp_path / "valve.json")]) == 1
+    assert main(["identify", *ramps, "--curve", "line", "-o", str(tmp_path / "valve.json")]) == 1
     *_, last = capsys.readouterr().err.strip().splitlines()
     assert "internal error" in last and "does not follow" in last
     assert not list(tmp_path.iterdir())

@@ -127,7 +127,7 @@ def test_a_plant_that_is_given_feels_the_dither_of_the_recordings_without_the_co
 
     plant_file = example_folder / "plant.toml"
     simulate(plant=plant_file, dither="150 Hz 1 %", dp=["1 MPa", "3 MPa"], ramp_time="25 s", output=tmp_path / "ramps")
-    valve = identify(str(tmp_path / "ramps" / "*.gz"), meter_lag="0.1 s", dithered="150 Hz 1 %")
+    valve = identify(str(tmp_path / "ramps" / "*.gz"), meter_lag="0.1 s", dithered="150 Hz 1 %", curve="line")
     test = valve.positive.tests[0]
     assert test.u_knee_rising_V - test.u_knee_falling_V < 0.03
     made, plant = designed(valve, dither="150 Hz 1 %"), read_plant(plant_file)
