@@ -14,7 +14,7 @@ from tests.support.synthetic import needs_compiler
 
 PAGE = ROOT / "docs" / "howto" / "ci.md"
 EXAMPLE = ROOT / "examples" / "paper_valve"
-OPTIONS = 'meter_lag = "0.1 s"\nmeter_floor = "0.6 L/min"\n'
+OPTIONS = 'meter_lag = "0.1 s"\nmeter_floor = "0.6 L/min"\ncurve = "line"\n'
 #: Steps that a test can't try: they install the wheel of a release.
 NOT_HERE = ("pip install tools/dzdesign-1.0.0-py3-none-any.whl",)
 

@@ -83,7 +83,7 @@ def recordings(folder, *, signed):
 def test_identify_says_the_direction_and_what_to_type_next(tmp_path, monkeypatch, capsys, signed):
     monkeypatch.chdir(tmp_path)
     recordings(tmp_path, signed=signed)
-    assert main(["identify", "*.csv", "--meter-lag", "0.1 s"]) == 0
+    assert main(["identify", "*.csv", "--meter-lag", "0.1 s", "--curve", "line"]) == 0
     out = capsys.readouterr().out
     drop = "pB_MPa - pA_MPa (recorded below zero)" if signed else "pA_MPa - pB_MPa"
     assert f"pressure drop at negative commands: {drop}\n" in out

@@ -24,6 +24,7 @@ from dzdesign.design.target_inputs import Converter
 from dzdesign.identify.identification import identify
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.model import ValveModel
+from dzdesign.identify.valve.recorded_drop import DropColumns
 from tests.support.paths import TESTS
 from tests.support.synthetic import Truth, synthetic_ramp
 
@@ -135,11 +136,13 @@ def identified_valve(root: Path) -> ValveModel:
     drops = (1.0, 3.0, 5.0)
     if root == GOLDENS:
         return identify([_ramp(dp, 5.406 - 0.05 * dp, 4.0) for dp in drops])
+    of_drop = DropColumns(quantities=("pA", "pB"), labels=("pA_MPa", "pB_MPa"))
+    positive = [replace(_ramp(dp, 5.5 - 0.05 * dp, 4.0), dp_from=((of_drop,), ())) for dp in drops]
     negative = [
-        replace(ramp, u=-ramp.u, q=-ramp.q)
+        replace(ramp, u=-ramp.u, q=-ramp.q, dp=-ramp.dp, dp_from=((), (of_drop,)))
         for ramp in (_ramp(dp, 3.0 + 0.04 * dp, 3.0, name="synthetic_minus") for dp in drops)
     ]
-    return identify([*(_ramp(dp, 5.5 - 0.05 * dp, 4.0) for dp in drops), *negative])
+    return identify([*positive, *negative])
 
 
 def _ramp(dp_MPa: float, knee_V: float, slope: float, name: str = "synthetic") -> RampTest:

@@ -112,7 +112,7 @@ def test_the_headline_of_a_batch_counts_calibrated_valves(capsys):
 def test_identify_says_what_would_raise_the_offset_most(bound, offset, budget, origin, scatter, most):
     curve = SimpleNamespace(
         dp_MPa=(1.0, 5.0), u_threshold_V=(5.0, 4.8), u_lower_V=bound, offset_dp_MPa=(1.0, 5.0), offset_V=offset,
-        errors=SimpleNamespace(budget_V=(budget, budget)),
+        proof=SimpleNamespace(shared_budget_V=0.0, ramps=[SimpleNamespace(budget_V=budget)] * 2),
     )  # fmt: skip
     basis = SimpleNamespace(repeatability=SimpleNamespace(origin=origin, sd_V=scatter))
     tests = [SimpleNamespace(u_knee_se_V=0.01)] * 2
