@@ -16,7 +16,6 @@ from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.command import sweep_direction
 from dzdesign.identify.ramps.splitting import split_ramps
 from dzdesign.identify.valve.model import ValveModel
-from dzdesign.identify.valve.staircase import staircase
 from tests.support.repeatable_valves import identify
 from tests.support.synthetic import L_MIN, MPA, Truth, synthetic_ramp
 
@@ -226,16 +225,6 @@ class TestParts:
             estimate, se = blocks.mean(axis=1), blocks.std(axis=1, ddof=2) / 4
             failures += bool(np.any(lower_bounds(estimate, se, without_scatter(5), 0.99, np.zeros(5)) > 0))
         assert failures <= 34
-
-    @pytest.mark.parametrize("shape", [np.sqrt, np.square, np.log1p], ids=["concave", "convex", "log"])
-    @pytest.mark.parametrize("sign", [-1, 1])
-    def test_chords_under_the_ceiling_stay_under_any_monotone_threshold(self, shape, sign):
-        dp = np.array([0.5, 1.0, 2.0, 3.5, 5.0])
-        threshold = 5 + sign * 0.1 * shape(dp)
-        trend = "increasing" if sign > 0 else "decreasing"
-        _, ceiling = staircase(threshold, trend)
-        dense = np.linspace(0.5, 5, 1000)
-        assert np.all(np.interp(dense, dp, ceiling) <= 5 + sign * 0.1 * shape(dense) + 1e-12)
 
     def test_a_small_change_is_flat_however_significant(self):
         dp, small = np.array([1.0, 2.0, 3.0]) * MPA, np.array([5.0, 4.997, 4.994])

@@ -87,10 +87,6 @@ class CostAtTest:
     full: float
     limited_from: float | None
 
-    def drive_text(self) -> str:
-        """Return the drive at full command, and where it is reached."""
-        return f"{self.full:.2%}" + (f" from {self.limited_from:.1%} on" if self.limited_from is not None else "")
-
     def text(self, units: RecordedUnits) -> str:
         """Return all of it as one line."""
         parts = [f"{units.text(self.dp_MPa, '.2f MPa')}: offset {units.text(self.offset_V, '.3f V')}"]

@@ -10,10 +10,10 @@ from itertools import pairwise
 from typing import Annotated
 
 from dzdesign.core.artefact_types import RuleError, Sha256, quantity
+from dzdesign.identify.constants import Direction
 from dzdesign.identify.valve.certified_bound import CertifiedBound
 from dzdesign.identify.valve.quantity_types import PressureDrop, Voltage
 from dzdesign.identify.valve.side_model import SideModel
-from dzdesign.identify.valve.staircase import Direction
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

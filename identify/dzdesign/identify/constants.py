@@ -7,6 +7,8 @@ Premise = Literal["line", "smooth", "monotone"]
 PREMISES: tuple[Premise, ...] = get_args(Premise)
 #: Probability, if a premise were true, of data as unlike it as these, below which it is refused.
 REFUSED = 0.01
+#: How a threshold runs with the pressure drop.
+Direction = Literal["decreasing", "flat", "increasing"]
 MPA = 1e6
 L_MIN = 1e-3 / 60
 #: Pressure drops beyond these, Pa, are a wrong unit.

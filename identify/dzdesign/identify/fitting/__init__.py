@@ -1,1 +1,1 @@
-"""Fitting: knees of all tests enter; the constrained fits (CasADi) and the certified bounds leave."""
+"""Fitting: what the tests show at and below the knee enters; guarded thresholds and certified curves leave."""

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dzdesign.identify.constants import Direction
 from dzdesign.identify.knees.between_ramps import BetweenRamps
-from dzdesign.identify.valve.staircase import Direction
 
 #: Probability, of a flat valve, of a change as large as the one found: a trend is called only below this.
 TREND_SIGNIFICANCE = 0.01

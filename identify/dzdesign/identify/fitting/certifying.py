@@ -8,7 +8,7 @@ import numpy as np
 from dzdesign.core.artefact_types import own_result
 from dzdesign.core.errors import InputError, InternalError
 from dzdesign.core.recorded_units import worded
-from dzdesign.identify.constants import MPA, PREMISES, REFUSED, Premise
+from dzdesign.identify.constants import MPA, PREMISES, REFUSED, Direction, Premise
 from dzdesign.identify.fit.certificate import ROUNDING_V as ROUNDING
 from dzdesign.identify.fit.certificate import (
     Certificate,
@@ -25,7 +25,6 @@ from dzdesign.identify.valve.above_tests import AboveTests
 from dzdesign.identify.valve.bound_proof import BoundProof
 from dzdesign.identify.valve.guard_curve import CertifiedCurve, CurvePremise, Guard, PremiseCheck
 from dzdesign.identify.valve.quantity_types import LARGEST_BETA
-from dzdesign.identify.valve.staircase import Direction
 
 #: The premise of each class, as valve.json names it.
 PREMISE_OF: dict[Kind, CurvePremise] = {

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dzdesign.identify.constants import MPA, REFUSED
+from dzdesign.identify.constants import MPA, REFUSED, Direction
 from dzdesign.identify.fit.ramp_model import Ramps
 from dzdesign.identify.fit.scatter import Scatter, measure_scatter
 from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, Trend, find_trend, lower_bounds
@@ -16,7 +16,6 @@ from dzdesign.identify.knees.described_tests import DescribedTests
 from dzdesign.identify.knees.knee_table import Knees
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.valve.guard_curve import Guard
-from dzdesign.identify.valve.staircase import Direction
 
 #: Share of the error probability that bounds of single tests leave to others.
 SHARE_OF_OTHERS = 0.25

@@ -4,10 +4,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from dzdesign.identify.constants import Direction
 from dzdesign.identify.fitting.bounds import FINEST_ERROR
 from dzdesign.identify.knees.knee_table import Knees
 from dzdesign.identify.valve.guard_curve import CertifiedCurve, OpeningCurve
-from dzdesign.identify.valve.staircase import Direction
 
 
 def opening_curve(

@@ -9,7 +9,7 @@ import numpy as np
 
 from dzdesign.core.artefact_types import RuleError, quantity
 from dzdesign.core.recorded_units import RecordedUnits
-from dzdesign.identify.constants import REFUSED, Premise
+from dzdesign.identify.constants import REFUSED, Direction, Premise
 from dzdesign.identify.valve.above_tests import AboveTests
 from dzdesign.identify.valve.bound_proof import BoundProof
 from dzdesign.identify.valve.certified_bound import CertifiedBound, largest_excess
@@ -21,7 +21,6 @@ from dzdesign.identify.valve.quantity_types import (
     Voltage,
     VoltageError,
 )
-from dzdesign.identify.valve.staircase import Direction
 
 Guard = Literal["closing", "mean", "opening"]
 #: Thresholds that a certificate may protect, from the safest on.

@@ -9,6 +9,7 @@ from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError, quantity
 from dzdesign.core.recorded_units import RecordedUnits
+from dzdesign.identify.constants import Direction
 from dzdesign.identify.valve.guard_curve import GUARDS, ROUNDING_V, CertifiedCurve, Guard, OpeningCurve
 from dzdesign.identify.valve.identified_curve import BETA_ROUNDING, IDENTIFIED, IdentifiedCurve
 from dzdesign.identify.valve.low_flow import LowFlow
@@ -24,7 +25,6 @@ from dzdesign.identify.valve.quantity_types import (
 from dzdesign.identify.valve.ramp_result import TestResult
 from dzdesign.identify.valve.recorded_drop import RecordedDrop
 from dzdesign.identify.valve.repeatability import Repeatability
-from dzdesign.identify.valve.staircase import Direction
 
 #: What bounds answer for over the declared zero flow, above which it is said to be more.
 PROMISED = 1.001
