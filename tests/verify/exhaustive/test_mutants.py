@@ -25,7 +25,7 @@ from tests.support.synthetic import needs_compiler
 
 pytestmark = needs_compiler
 #: Of the hundreds of a firmware, those that every run of the tests tries; `make bench-verify` tries all.
-TRIED, SEED = 12, 5
+TRIED, SEED = 24, 5
 
 
 def bench_of(root, target: str, folder) -> MutationBench:
@@ -79,7 +79,9 @@ def test_a_part_of_all_mutants_is_killed_or_equivalent(name, request):
     outcomes = judge_all(bench, random.Random(SEED).sample(every, TRIED))
     found = Counter(each.verdict for each in outcomes)
     assert found[SURVIVED] == 0 and found[REFUSED] == 0
-    assert found[KILLED] >= 0.6 * TRIED  # a number that a design leaves at 0 has mutants with the same outputs
+    # A number that a design leaves at 0 has mutants with the same outputs: of 160 drawn 112 were killed, and a sample of
+    # 24 with fewer than 12 is one in fifty.
+    assert found[KILLED] >= 0.5 * TRIED
     assert all(bool(each.killer) == (each.verdict == KILLED) for each in outcomes)
 
 
