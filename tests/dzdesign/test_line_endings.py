@@ -95,7 +95,8 @@ def test_recordings_that_differ_in_line_endings_only_are_the_same(tmp_path, monk
             (tmp_path / place / path.stem).write_bytes(content)
             names.append(path.stem)
     monkeypatch.chdir(tmp_path)
-    assert main(["identify", *(f"unix/{name}" for name in dict.fromkeys(names)), *"--curve line -o valve.json".split()]) == 0
+    ramps = [f"unix/{name}" for name in dict.fromkeys(names)]
+    assert main(["identify", *ramps, "--curve", "line", "-o", "valve.json"]) == 0
     assert main(["design", "valve.json", "-o", "compensator.json"]) == 0
     from dzdesign.core.artefact_reading import read_artefact
     from dzdesign.design.compensator import Compensator
