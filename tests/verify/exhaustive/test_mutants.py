@@ -79,8 +79,8 @@ def test_a_part_of_all_mutants_is_killed_or_equivalent(name, request):
     outcomes = judge_all(bench, random.Random(SEED).sample(every, TRIED))
     found = Counter(each.verdict for each in outcomes)
     assert found[SURVIVED] == 0 and found[REFUSED] == 0
-    # A number that a design leaves at 0 has mutants with the same outputs: of 160 drawn 112 were killed, and a sample of
-    # 24 with fewer than 12 is one in fifty.
+    # A number that a design leaves at 0 has mutants with the same outputs: of 160 drawn 112 were killed, and fewer
+    # than 12 of 24 are one sample in fifty.
     assert found[KILLED] >= 0.5 * TRIED
     assert all(bool(each.killer) == (each.verdict == KILLED) for each in outcomes)
 
