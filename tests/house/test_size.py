@@ -22,7 +22,7 @@ ROOM_SIZES = {
     "dzdesign": (9427, 65, 156),
 }
 #: Lines of Python of what is not shipped, and of the files that the tests compare with.
-TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 45177, 13989, 8475
+TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 45181, 13989, 8475
 #: Options of all commands together; an option of two commands counts twice.
 OPTIONS = 275
 #: What a number may be above what is there, before it is to be lowered.

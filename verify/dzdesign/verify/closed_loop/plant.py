@@ -40,7 +40,7 @@ LARGEST_DP_MPA = 40.0
 #: In a step the spool moves by so many radians of its fastest motion at most, and the coil by so many of its own, whose
 #: error the spool feels for a shorter time. An undamped spool keeps what a step is off by: so many times shorter steps,
 #: below so much damping, as a share of that at which it no longer swings.
-SPOOL_RAD, COIL_RAD = 0.05, 0.06
+SPOOL_RAD, COIL_RAD = 0.1, 0.12
 UNDAMPED, SHORTER = 0.02, 4.0
 #: Numbers of a plant that plant.h and the step read by name, in SI units where none stands.
 NAMED = (
