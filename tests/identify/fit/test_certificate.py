@@ -108,6 +108,12 @@ def test_the_multipliers_prove_the_offsets_without_a_solver(case):
         np.testing.assert_allclose(prove(curves, known, proof.rows).offsets, proof.offsets, atol=1e-7)
 
 
+def test_a_programme_in_which_the_first_solver_gives_up_is_proved():
+    """Seven pressures by hand: the rows that a solver with loose tolerances then named missed their proof by 2e-6."""
+    scatter = scatter_of(ramps_of(scatter=5e-3, by_hand=0.03, seed=9, pressures=7, repeats=2))
+    assert certify(scatter, find_class(scatter, curve="smooth", curvature=0.2)).bound.min() > 4.8
+
+
 def test_data_that_contradict_a_premise_are_refused():
     scatter = scatter_of(ramps_of("U", scatter=2e-3))
     for curve, direction in (("line", 0), ("monotone", 0), ("monotone", -1)):

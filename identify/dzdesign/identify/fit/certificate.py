@@ -35,12 +35,13 @@ TOGETHER = 8
 PROOF, SMALLEST, SLACK = 1e-6, 1e-9, 1e-5
 #: Times the rows that the multipliers are solved for in at most.
 ROUNDS = 100
-#: Solvers, tried in turn: tight tolerances may leave the first in numerical difficulties. Whichever answers, its
-#: multipliers are solved for once more and prove themselves, so that a poor answer costs an offset and no safety.
+#: Solvers, tried in turn: tight tolerances may leave the first in numerical difficulties, and loose ones name rows that
+#: miss a proof. Whichever answers, its multipliers are solved for once more and prove themselves, so that a poor answer
+#: costs an offset and no safety.
 SOLVERS: tuple[tuple[str, dict[str, float]], ...] = (
     ("highs-ds", {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}),
-    ("highs-ds", {}),
     ("highs-ipm", {}),
+    ("highs-ds", {}),
 )
 #: What a number of the file, which has seven decimals, may be off by, V.
 ROUNDING_V = 1.5e-7
