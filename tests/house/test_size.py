@@ -17,12 +17,12 @@ ROOM_SIZES = {
     "assess": (1687, 13, 0),
     "design": (6611, 30, 0),
     "codegen": (7422, 50, 7308),
-    "verify": (9412, 52, 2057),
+    "verify": (9592, 53, 2057),
     "report": (4419, 20, 532),
     "dzdesign": (9427, 65, 156),
 }
 #: Lines of Python of what is not shipped, and of the files that the tests compare with.
-TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 45188, 13989, 8475
+TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 45278, 13991, 8475
 #: Options of all commands together; an option of two commands counts twice.
 OPTIONS = 275
 #: What a number may be above what is there, before it is to be lowered.

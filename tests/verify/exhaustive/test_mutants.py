@@ -25,7 +25,7 @@ from tests.support.synthetic import needs_compiler
 
 pytestmark = needs_compiler
 #: Of the hundreds of a firmware, those that every run of the tests tries; `make bench-verify` tries all.
-TRIED, SEED = 24, 5
+TRIED, SEED = 12, 5
 
 
 def bench_of(root, target: str, folder) -> MutationBench:
@@ -80,8 +80,8 @@ def test_a_part_of_all_mutants_is_killed_or_equivalent(name, request):
     found = Counter(each.verdict for each in outcomes)
     assert found[SURVIVED] == 0 and found[REFUSED] == 0
     # A number that a design leaves at 0 has mutants with the same outputs: of 160 drawn 112 were killed, and fewer
-    # than 12 of 24 are one sample in fifty.
-    assert found[KILLED] >= 0.5 * TRIED
+    # than 5 of 12 are one sample in a hundred.
+    assert found[KILLED] >= 0.4 * TRIED
     assert all(bool(each.killer) == (each.verdict == KILLED) for each in outcomes)
 
 

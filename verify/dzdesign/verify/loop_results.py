@@ -89,6 +89,10 @@ class PressureResult(AtZero):
     """Largest flow without the compensator."""
     q_max_L_min: Flow
     """Largest flow with the compensator."""
+    full_from: Share
+    """Command from which the output is the largest that it comes to."""
+    hysteresis: Share
+    """Distance of the branches with the compensator over the command, the mean from 5 to 99 % of the largest flow."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -89,6 +89,7 @@ ZERO_FLOW = Requirement(id="zero-flow", title="no flow at zero command in the cl
 ZERO_FLOW_AFTER_SCENARIOS = Requirement(
     id="zero-flow-after-scenarios", title="no flow at zero command after any required scenario"
 )
+COMPENSATES = Requirement(id="compensates", title="the dead zone is compensated, and the full flow remains")
 NATIVE_PLANT = Requirement(id="native-plant", title="the plant of the closed loop agrees with CasADi's integrator")
 #: Checked by the front door, which asks `identify`. Without it thresholds are taken as stated.
 RAMPS = Requirement(
@@ -167,7 +168,7 @@ CURRENT_VALVE = Requirement(
 OF_INPUTS = (EXACT_LAW, MONOTONE, ZERO_COMMAND, ABOVE_TESTS, PRESSURE_DIFFERENCE, FALLBACK)
 OF_CURRENT = (CURRENT_STATES, CURRENT_MARGINS, CURRENT_SETTLES, CURRENT_STEP, CURRENT_FAULTS)
 OF_LOOP = (
-    PLANT_OPENS, PLANT_IS_THE_VALVE, ZERO_FLOW, ZERO_FLOW_AFTER_SCENARIOS, CURRENT_VALVE, NATIVE_PLANT,
+    PLANT_OPENS, PLANT_IS_THE_VALVE, ZERO_FLOW, ZERO_FLOW_AFTER_SCENARIOS, CURRENT_VALVE, COMPENSATES, NATIVE_PLANT,
 )  # fmt: skip
 #: What every run tries; evidence that lacks one of them is not that of a firmware that holds.
 ALWAYS = (REPRODUCED, COMPILES, *OF_INPUTS, DRIVE, *(each for each in OF_LOOP if each is not CURRENT_VALVE))

@@ -18,6 +18,7 @@ from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.design.pressure_inputs import not_covered
 from dzdesign.verify import requirements
 from dzdesign.verify.closed_loop.against_cvodes import compare_with_cvodes
+from dzdesign.verify.closed_loop.compensation import compensates
 from dzdesign.verify.closed_loop.firmware_loop import FirmwareLoop, Watch, close_the_loop
 from dzdesign.verify.closed_loop.loop import RampSequence
 from dzdesign.verify.closed_loop.plant import Plant
@@ -146,6 +147,8 @@ def _closed_loop(firmware: Firmware) -> Iterator[Check]:
     )
     firmware.curves = {**loop_curves(firmware.loop.loops), **firmware.curves}
     yield from firmware.loop.checks
+    results, given = [loop.result for loop in firmware.loop.loops], asked.plant is not None
+    yield compensates(results, firmware.curves, firmware.compensator, plant_given=given)
     yield compare_with_cvodes(scenes, firmware.say)
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dzdesign.design.costs_at_tests import LEVELS
 from dzdesign.identify.valve.reading_flow import dead_zone_at, ideal_line
 from dzdesign.identify.valve.recorded_curve import RecordedCurve
 from dzdesign.verify.closed_loop.loop import LoopRun, RampSequence
@@ -84,6 +85,8 @@ def compare_at_pressure(scene: Scene, sequence: RampSequence) -> LoopComparison:
         flow_miss_at=miss_at,
         q_max_direct_L_min=float(direct.q_L_min.max()),
         q_max_L_min=largest,
+        full_from=float(command[np.argmax(with_core.compare)]),
+        hysteresis=hysteresis_of(with_core),
         **read,
     )
     return LoopComparison(result=stored(result), direct=direct, compensated=with_core)
@@ -92,6 +95,12 @@ def compare_at_pressure(scene: Scene, sequence: RampSequence) -> LoopComparison:
 def dead_zone(run: LoopRun, level: float, *, rising: bool) -> float:
     """Return the command share at which flow first reaches `level` going up, or last holds it going down."""
     return dead_zone_at(level, run.command, run.q_mean_L_min, rising=rising)
+
+
+def hysteresis_of(run: LoopRun) -> float:
+    """Return the mean distance of the branches over the command, a share, at flows from 5 to 99 % of the largest."""
+    levels = np.array(LEVELS) * run.q_mean_L_min.max()
+    return float(np.mean([dead_zone(run, each, rising=True) - dead_zone(run, each, rising=False) for each in levels]))
 
 
 def largest_miss(run: LoopRun, u_max_V: float, recorded: RecordedCurve) -> tuple[float, float]:
