@@ -12,7 +12,6 @@ from dzdesign.assess.assessment import (
     Request,
 )
 from dzdesign.assess.curve_pairs import Comparison, CurvePair, compare_curves, relative_distance
-from dzdesign.assess.flow_curves import PressureCurves
 from dzdesign.assess.limits import check_limits
 from dzdesign.assess.measured_curves import measured_curve
 from dzdesign.assess.notes import find_notes
@@ -39,11 +38,7 @@ def assess(before: Sequence[RampTest], after: Sequence[RampTest], options: Asses
     InputError
         For recordings that can't be read, and for sets that share no pressure drop.
     """
-    return assess_curves(compare_curves(before, after, options or AssessOptions()))
-
-
-def assess_curves(comparison: Comparison) -> Assessment:
-    """Read every quantity of both sets, and check the limits."""
+    comparison = compare_curves(before, after, options or AssessOptions())
     options, units = comparison.options, comparison.units
     flows = [_reading_flow(pair, options) for pair in comparison.pairs]
     readings = [_read(pair, flow, comparison) for pair, flow in zip(comparison.pairs, flows, strict=True)]
@@ -130,8 +125,8 @@ def _pressure(
         dp_MPa=_in_MPa(pair.first.dp),
         reading_flow_L_min=reading_flow / L_MIN,
         rated_flow_L_min=pair.first.y_max / L_MIN,
-        before=_ramp_set(pair.before, options.of_set("before").u_max),
-        after=_ramp_set(pair.after, options.of_set("after").u_max),
+        before=_ramp_set(pair, "before", options),
+        after=_ramp_set(pair, "after", options),
         quantities={
             key: BeforeAfter(before=old.get(key), after=new.get(key), change=change(old.get(key), new.get(key)))
             for key in keys
@@ -139,12 +134,13 @@ def _pressure(
     )
 
 
-def _ramp_set(curves: PressureCurves | None, u_max: float) -> RampSet | None:
-    if curves is None:
+def _ramp_set(pair: CurvePair, name: Set, options: AssessOptions) -> RampSet | None:
+    if (curves := pair.sets.get(name)) is None:
         return None
     return RampSet(
-        source=curves.source, ramps=curves.ramps, dp_MPa=_in_MPa(curves.dp), curve=measured_curve(curves, u_max)
-    )
+        source=curves.source, ramps=curves.ramps, dp_MPa=_in_MPa(curves.dp),
+        curve=measured_curve(curves, options.of_set(name).u_max),
+    )  # fmt: skip
 
 
 def _in_MPa(dp: float | None) -> float | None:

@@ -93,17 +93,17 @@ def _fastest(name: Set, comparison: Comparison) -> float:
 
 
 def _about_zero(pair: CurvePair, item: PressureAssessment, units: RecordedUnits) -> Iterator[Warning_]:
-    reading = item.readings("before").get("flow_at_zero")
-    if pair.before is None or reading is None or reading.value is None:
+    before, reading = pair.sets.get("before"), item.readings("before").get("flow_at_zero")
+    if before is None or reading is None or reading.value is None:
         return
-    if abs(reading.value) > max(ZERO_SIGNIFICANCE * (reading.se or 0.0), ZERO_SHARE * pair.before.q_max / L_MIN):
+    if abs(reading.value) > max(ZERO_SIGNIFICANCE * (reading.se or 0.0), ZERO_SHARE * before.q_max / L_MIN):
         yield Warning_(
             code="meter-zero",
             text=(
                 f"{item.place(units)}: at zero command {units.text(reading.value, '+.3g L/min')} flow without the "
                 "compensator too: the meter's zero error, or a leak. Nothing is subtracted from any flow"
             ),
-            source=pair.before.source,
+            source=before.source,
         )
 
 
@@ -121,7 +121,7 @@ def _about_the_command(pair: CurvePair, item: PressureAssessment, comparison: Co
                 source=curves.source,
             )
     old, new = (item.readings(name).get("dead_zone_opening") for name in SETS)
-    if pair.after and old and new and old.value and new.value and new.value > UNCHANGED * old.value:
+    if "after" in pair.sets and old and new and old.value and new.value and new.value > UNCHANGED * old.value:
         yield Warning_(
             code="unchanged",
             text=(
@@ -129,5 +129,5 @@ def _about_the_command(pair: CurvePair, item: PressureAssessment, comparison: Co
                 "it; are the sets the wrong way round, or is the command AFTER the compensator's output and not its "
                 "input? --after-columns says which column"
             ),
-            source=pair.after.source,
+            source=pair.sets["after"].source,
         )

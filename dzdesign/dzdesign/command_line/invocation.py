@@ -15,7 +15,7 @@ from dzdesign.command_line.parser import (
     unknown_words,
 )
 from dzdesign.core.errors import InputError, nearest, quoted
-from dzdesign.core.options import Argument, flag_of
+from dzdesign.core.options import Argument, arguments_of, flag_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,7 +53,7 @@ def parse(argv: list[str]) -> Invocation:
     json, quiet, verbose = (given.pop(key, False) for key in ("json", "quiet", "verbose"))
     if quiet and verbose:
         raise InputError("--quiet and --verbose contradict each other; give one of them")
-    declared, options_file = arguments_of_command(name), given.pop("config", "")
+    declared, options_file = arguments_of(command_module(name).Arguments), given.pop("config", "")
     values = _meant_values(name, options_file, declared) if options_file else {}
     from_file = {key: value for key, value in values.items() if key not in given}
     for argument in declared:

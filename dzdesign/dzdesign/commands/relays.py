@@ -124,44 +124,6 @@ def _whole_lot(summary: Any, arguments: Any) -> bool:
     return True
 
 
-def _after_export(made: Any, arguments: Any) -> tuple[str, ...]:
-    return (f"Written: {arguments.output}" if arguments.output else "Nothing is written: give -o FILE",)
-
-
-def _document_of_export(made: Any, arguments: Any) -> dict[str, Any]:
-    """Return what was set and what it leaves; shares are of full command and full drive."""
-    from dzdesign.design.signals import SIDE_NAMES
-
-    setting = made.setting
-    sides = {
-        SIDE_NAMES[sign]: {
-            "safe_share": float(offset.share),
-            "lowest_at_MPa": float(offset.lowest_at_MPa),
-            "dp_MPa": [float(end) for end in offset.dp_MPa],
-            "points": [[float(value) for value in node] for node in setting.characteristics[sign].nodes],
-        }
-        for sign, offset in setting.offsets.items()
-    }
-    return {
-        "file": None if arguments.output is None else os.fspath(arguments.output),
-        "device": setting.device.name,
-        "title": setting.device.title,
-        "sources": list(setting.device.sources),
-        "parameters": dict(setting.parameters),
-        "unit": setting.device.unit,
-        "dp_MPa": None if setting.dp_MPa is None else float(setting.dp_MPa),
-        "sides": sides,
-        "dead_zones": [
-            {"side": row.side, "dp_MPa": row.dp_MPa, "fixed": dict(row.fixed), "law": dict(row.law),
-             "fixed_end_L_min": row.fixed_end_L_min, "law_end_L_min": row.law_end_L_min}
-            for row in made.dead_zones
-        ],
-        "notes": list(made.notes),
-        "checks": [{"id": each.id, "name": each.name, "holds": each.holds, "text": each.text} for each in made.checks],
-        "compensator_sha256": made.compensator_sha256,
-    }  # fmt: skip
-
-
 def _lines_of_proposal(proposal: Any, arguments: Any) -> Iterator[str]:
     yield from proposal.seen
     yield from (f"open: {line}" for line in proposal.opens)
@@ -211,16 +173,6 @@ RELAYS: Mapping[str, Relay] = {
         ("dzdesign design valve.json", "dzdesign design valve.json --hysteresis play --target cortex-m4"),
         "terminal.design_tables:print_design", _written,
     ),
-    "export": Relay(
-        "stages.export:ExportArguments", "stages.export:export",
-        (
-            "dzdesign export compensator.json --to west        # print the parameters and the dead zone that remains",
-            "dzdesign export compensator.json --to west -o pam199.txt",
-            "dzdesign export compensator.json --to cia408 -o valve.dcf --threshold '1 %'",
-            'dzdesign export compensator.json --to beckhoff -o table.st --table-dp "2 MPa"',
-        ),
-        "terminal.output_tables:print_export", _after_export, document=_document_of_export,
-    ),
     "verify": Relay(
         "stages.verify:VerifyArguments", "stages.verify:verify",
         (
@@ -236,7 +188,7 @@ RELAYS: Mapping[str, Relay] = {
         "stages.assess:AssessArguments", "stages.assess:assess",
         (
             'dzdesign assess before/*.csv --after after/*.csv --limits "dead_zone_opening = 5 %"',
-            "dzdesign assess before/*.csv --after after/*.csv --config dzdesign.toml --plots plots",
+            "dzdesign assess before/*.csv --after after/*.csv --config dzdesign.toml",
         ),
         "terminal.assessment_tables:print_assessment", _written, holds=_holds,
     ),
@@ -251,9 +203,9 @@ RELAYS: Mapping[str, Relay] = {
     "batch": Relay(
         "batch.arguments:BatchArguments", "stages.batch:batch",
         (
-            'dzdesign batch lot -o calibrated --jobs 4 --meter-lag "0.1 s"',
-            'dzdesign batch lot -o calibrated --meter-lag "0.1 s" --calibration block',
-            "dzdesign batch lot.csv -o calibrated --verify --dask tcp://10.0.0.5:8786",
+            "dzdesign batch lot -o calibrated --config dzdesign.toml --jobs 4",
+            "dzdesign batch lot -o calibrated --config dzdesign.toml --calibration block",
+            "dzdesign batch lot.csv -o calibrated --config dzdesign.toml --verify --dask tcp://10.0.0.5:8786",
         ),
         "batch.printing:print_quantiles", _lines_of_lot, holds=_whole_lot, document=_document_of_lot,
         one_valve=("low_flow",),

@@ -1,17 +1,13 @@
 """`codegen`, in Python `generate`: Compensator + target -> Firmware."""
 
-import os
 from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from dzdesign.core.artefact_files import check_folder_may_be_written
-from dzdesign.core.documents import parse_document, read_bytes
-from dzdesign.core.errors import InputError, quoted
 from dzdesign.core.option_readers import percent, quantity, whole_number
-from dzdesign.core.options import OUTPUTS, AnyPath, Option, Text, flag_of, read_options
-from dzdesign.design.design_choices import DEFAULTS, DesignChoices
-from dzdesign.stages.design import design_options
+from dzdesign.core.options import OUTPUTS, AnyPath, Option, Text, read_options
+from dzdesign.stages.design import given_compensator
 
 if TYPE_CHECKING:
     from dzdesign.codegen.other_targets import Output
@@ -40,17 +36,16 @@ class OutputChoices:
 
 
 @dataclass(frozen=True)
-class GenerateArguments(OutputChoices, DesignChoices):
+class GenerateArguments(OutputChoices):
     """Arguments of `codegen`, in Python `generate`."""
 
     compensator: Annotated["Compensator | AnyPath", Option("COMPENSATOR.json")]
-    """The compensator.json of the design, or a valve.json, which is first designed with the options of `design`."""
+    """The compensator.json made by `dzdesign design`."""
     _: KW_ONLY
     output: Annotated[AnyPath | None, Option("DIR", short="-o")] = None
     """Folder to write (default of the command: firmware, or plc, fmu, matlab or amplifier for such an output)."""
     target: Annotated[Text, Option("NAME")] = None
-    """Microcontroller, or another output: iec61131, fmu, matlab, amplifier (default: the microcontroller of the design,
-    and f28335 for a valve.json)."""
+    """Microcontroller, or another output: iec61131, fmu, matlab, amplifier (default: the design's microcontroller)."""
     calibration: Annotated[Text, Option("FORM")] = None
     """Form of the valve's numbers (default: fixed). fixed: constants in the core. block: a block of data that the core
     receives."""
@@ -106,8 +101,7 @@ def _firmware(arguments: GenerateArguments, target: str) -> "Firmware":
     form = form_named(arguments.calibration)
     settings_of(target, chosen_of_outputs(arguments))
     vectors: int = read_options(arguments, ["vectors"])["vectors"]
-    made, designed = _compensator(arguments, target)
-    firmware = generate_project(made, target if designed else arguments.target, form, vectors)
+    firmware = generate_project(_compensator(arguments), arguments.target, form, vectors)
     if arguments.output is None:
         return firmware
     return write_generated(firmware, Path(arguments.output), over_another=arguments.replace)
@@ -116,15 +110,13 @@ def _firmware(arguments: GenerateArguments, target: str) -> "Firmware":
 def _other_output(arguments: GenerateArguments, target: str) -> "Output":
     """Generate an output other than a C firmware, and write it where that is asked for."""
     from dzdesign.codegen.other_targets import OF_FIRMWARE, generate_output, settings_of
-    from dzdesign.codegen.project import DEFAULT_TARGET
     from dzdesign.codegen.writing import write_generated
 
     given = chosen_of_outputs(arguments)
     of_firmware = {name: getattr(arguments, name) for name in OF_FIRMWARE}
     given |= {name: str(value) for name, value in of_firmware.items() if value not in (None, 0, "0")}
     settings = settings_of(target, given)
-    made, _ = _compensator(arguments, DEFAULT_TARGET)
-    output = generate_output(made, target, settings)
+    output = generate_output(_compensator(arguments), target, settings)
     if arguments.output is None:
         return output
     return write_generated(output, Path(arguments.output), over_another=arguments.replace)
@@ -151,42 +143,10 @@ def _plant_text(path: Path) -> str:
     return json.dumps({name: float(value) for name, value in asdict(read_plant(path, say)).items()})
 
 
-def _compensator(arguments: GenerateArguments, target: str) -> "tuple[Compensator, bool]":
-    """Return the compensator, and whether it was designed here."""
-    from dzdesign.core.artefact_reading import read_artefact
-    from dzdesign.design.compensator import SCHEMA as COMPENSATOR_SCHEMA
-    from dzdesign.design.compensator import Compensator
-    from dzdesign.design.designing import design as design_valve
+def _compensator(arguments: GenerateArguments) -> "Compensator":
     from dzdesign.design.redesign import refuse_without_options
-    from dzdesign.identify.valve.model import SCHEMA as VALVE_SCHEMA
-    from dzdesign.identify.valve.model import ValveModel
 
-    given = arguments.compensator
-    if isinstance(given, Compensator):
-        _refuse_other_choices(given, "the compensator", arguments)
-        return given, False
-    source, content = os.fspath(given), read_bytes(Path(given), "compensator file")
-    document = parse_document(content, source, (COMPENSATOR_SCHEMA, VALVE_SCHEMA))
-    if document["schema"] == VALVE_SCHEMA:
-        valve = read_artefact(content, ValveModel, source)
-        return design_valve(valve, design_options(arguments, target)), True
-    compensator = read_artefact(content, Compensator, source)
-    refuse_without_options(compensator, source)
-    _refuse_other_choices(compensator, f"'{source}'", arguments)
-    return compensator, False
-
-
-def _refuse_other_choices(compensator: "Compensator", source: str, choices: DesignChoices) -> None:
-    """Refuse options that a compensator was not designed with.
-
-    Its own may be given again, as by the options file of all commands.
-    """
-    designed = compensator.options or {}
-    for name in DEFAULTS:
-        given = getattr(choices, name)
-        if given is not None and given != designed.get(name):
-            own = f"with {quoted(designed[name])}" if designed.get(name) else "without it"
-            raise InputError(
-                f"{flag_of(name)} is {quoted(given)}, but {source} was designed {own}; leave the option out, or run "
-                "`dzdesign design` again"
-            )
+    compensator, _, source = given_compensator(arguments.compensator)
+    if not isinstance(arguments.compensator, type(compensator)):
+        refuse_without_options(compensator, source.strip("'"))
+    return compensator

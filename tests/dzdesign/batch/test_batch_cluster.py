@@ -27,14 +27,14 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.design_choices import DesignChoices
 from dzdesign.stages.identify import IdentifyChoices
 from tests.dzdesign.batch.crashing_work import die_over_bad
-from tests.support.many_valves import write_lot
+from tests.support.many_valves import LOT_TOML, write_lot
 from tests.support.paths import ROOT
 from tests.support.synthetic import needs_compiler
 
 pytestmark = pytest.mark.slow
 
 COUNT, SEED = 7, 7
-OPTIONS = ["--meter-lag", "0.1 s", "--target", "host"]
+OPTIONS = ["--config", str(LOT_TOML), "--target", "host"]
 #: Each block is tried by the worker that makes it, and the lot's firmware is written here.
 BLOCKS = ["--calibration", "block"]
 NOTHING = dict(recordings=(), identify=IdentifyChoices(), design=DesignChoices(), target="host")

@@ -16,7 +16,7 @@ from dzdesign.assess.limits import LimitResult
 from dzdesign.assess.measured_curves import MeasuredCurve
 from dzdesign.assess.options import SETS, Set
 from dzdesign.assess.quantities import LOSS
-from dzdesign.assess.thinned_curves import Line, gain_of, hysteresis_of, linearity_of
+from dzdesign.assess.readings import Line, gain_of, hysteresis_of, linearity_of
 from dzdesign.identify.ramps.pooling import SAME_PRESSURE
 from dzdesign.identify.valve.model import SIDES, ValveModel
 from dzdesign.identify.valve.ramp_result import TestResult
