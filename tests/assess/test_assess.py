@@ -11,10 +11,9 @@ import pytest
 
 from dzdesign.assess.assessing import assess
 from dzdesign.assess.assessment import Assessment
-from dzdesign.assess.limits import LIMITED, parse_limits
-from dzdesign.assess.measured_curves import MOST_POINTS, MOST_SAMPLES
+from dzdesign.assess.flow_curves import MOST_POINTS, MOST_SAMPLES
 from dzdesign.assess.options import AssessOptions
-from dzdesign.assess.quantities import QUANTITIES, observed
+from dzdesign.assess.quantities import LIMITED, QUANTITIES, observed, parse_limits
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import RuleError, as_document, to_json_bytes

@@ -14,17 +14,17 @@ ROOM_SIZES = {
     "core": (2767, 15, 0),
     "derivation": (4704, 28, 325),
     "identify": (17229, 125, 1064),
-    "assess": (1615, 11, 0),
+    "assess": (1577, 8, 0),
     "design": (6611, 30, 0),
     "codegen": (7406, 50, 7308),
     "verify": (9412, 52, 2057),
     "report": (4419, 20, 532),
-    "dzdesign": (9115, 64, 156),
+    "dzdesign": (8947, 59, 156),
 }
 #: Lines of Python of what is not shipped, and of the files that the tests compare with.
-TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 45036, 13962, 8473
+TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 45019, 13953, 8473
 #: Options of all commands together; an option of two commands counts twice.
-OPTIONS = 162
+OPTIONS = 161
 #: What a number may be above what is there, before it is to be lowered.
 SLACK = 0.02
 TEXTS = {".jinja", ".c", ".h", ".m", ".ld", ".toml", ".html", ".css", ".js", ".svg", ".md", ".txt"}

@@ -9,17 +9,20 @@ from pathlib import Path
 
 from dzdesign.batch.arguments import BatchArguments
 from dzdesign.batch.calibration import Outcome, Task
-from dzdesign.batch.lot_firmware import firmware_left, foreign_block, needing_another, write_lot_firmware
 from dzdesign.batch.outputs import WantedOutput, wanted_outputs
 from dzdesign.batch.runners import run_local, run_on_cluster
 from dzdesign.batch.summary import (
     SETTING_NAME,
     anomalies_of,
+    firmware_left,
+    foreign_block,
     lot_outputs,
     lot_setting_of,
+    needing_another,
     setting_summary,
     summary_of,
     units_of_lot,
+    write_lot_firmware,
 )
 from dzdesign.batch.valve_folders import Results, ValveFolder, table_of_valves
 from dzdesign.batch.valves import Valve, valves_of

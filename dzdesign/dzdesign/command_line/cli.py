@@ -54,7 +54,7 @@ def main(argv: list[str] | None = None) -> int:
     except DzdesignError as error:
         text = str(error)
         if call is not None and call.from_file:
-            from dzdesign.command_line.options_file import in_words_of_the_file
+            from dzdesign.command_line.invocation import in_words_of_the_file
 
             text = in_words_of_the_file(text, call.options_file, call.from_file)
         _tell(clear_line(text))

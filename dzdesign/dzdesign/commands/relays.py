@@ -181,7 +181,7 @@ RELAYS: Mapping[str, Relay] = {
             'dzdesign verify calibrated/lot/firmware --blocks "calibrated/valves/*/calibration.bin"',
             "dzdesign verify firmware --machine-code",
         ),
-        "terminal.verification_tables:print_result", _after_verify, holds=_holds,
+        "terminal.evidence_tables:print_result", _after_verify, holds=_holds,
         document=lambda made, arguments: made.evidence,
     ),
     "assess": Relay(
@@ -190,7 +190,7 @@ RELAYS: Mapping[str, Relay] = {
             'dzdesign assess before/*.csv --after after/*.csv --limits "dead_zone_opening = 5 %"',
             "dzdesign assess before/*.csv --after after/*.csv --config dzdesign.toml",
         ),
-        "terminal.assessment_tables:print_assessment", _written, holds=_holds,
+        "terminal.evidence_tables:print_assessment", _written, holds=_holds,
     ),
     "simulate": Relay(
         "stages.simulate:SimulateArguments", "stages.simulate:simulate",
@@ -212,7 +212,7 @@ RELAYS: Mapping[str, Relay] = {
     ),
     "reproduce": Relay(
         "stages.reproduce:ReproduceArguments", "stages.reproduce:reproduce",
-        ("dzdesign reproduce -o reproduction",), "terminal.reproduction_tables:print_reproduction",
+        ("dzdesign reproduce -o reproduction",), "terminal.evidence_tables:print_reproduction",
         lambda made, arguments: (f"Figures, parameters and artefacts: {arguments.output}",), holds=_holds,
     ),
 }  # fmt: skip

@@ -105,8 +105,8 @@ def _read_set(name: str, patterns: Paths, columns: Table, arguments: AssessArgum
 
 def assess_options(arguments: AssessArguments) -> "AssessOptions":
     """Return the options of `assess` in SI units."""
-    from dzdesign.assess.limits import parse_limits
     from dzdesign.assess.options import AssessOptions
+    from dzdesign.assess.quantities import parse_limits
     from dzdesign.identify.options import IdentifyOptions
 
     reading = IdentifyOptions(**meter_choices(arguments, ["u_max", "meter_floor", "meter_lag", "knee_window"]))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 from dzdesign.core.artefact_files import check_folder_may_be_written
 from dzdesign.core.option_readers import percent, quantity, whole_number
 from dzdesign.core.options import OUTPUTS, AnyPath, Option, Text, read_options
-from dzdesign.stages.design import given_compensator
+from dzdesign.stages.design import given_compensator, refuse_underived
 
 if TYPE_CHECKING:
     from dzdesign.codegen.other_targets import Output
@@ -78,48 +78,43 @@ def generate(arguments: GenerateArguments) -> "Firmware | Output":
     >>> "core/dz_comp.c" in firmware.files                             # doctest: +SKIP
     True
     """
-    from dzdesign.codegen.other_targets import OTHER_TARGETS, check_target_name
+    from dzdesign.codegen.other_targets import (
+        OF_FIRMWARE,
+        OTHER_TARGETS,
+        check_target_name,
+        generate_output,
+        settings_of,
+    )
     from dzdesign.codegen.project import DEFAULT_TARGET
+    from dzdesign.codegen.project import generate as generate_project
+    from dzdesign.codegen.writing import write_generated
     from dzdesign.core.artefact_types import schema_of
-    from dzdesign.design.firmware_manifest import FirmwareManifest, OutputManifest
+    from dzdesign.design.firmware_manifest import FirmwareManifest, OutputManifest, form_named
+    from dzdesign.design.redesign import refuse_without_options
 
     target = arguments.target or DEFAULT_TARGET
     check_target_name(target)
-    kind = OutputManifest if target in OTHER_TARGETS else FirmwareManifest
-    if arguments.output is not None:
-        check_folder_may_be_written(Path(arguments.output), schema_of(kind))
-    return _other_output(arguments, target) if target in OTHER_TARGETS else _firmware(arguments, target)
-
-
-def _firmware(arguments: GenerateArguments, target: str) -> "Firmware":
-    """Generate the C project, and write it where that is asked for."""
-    from dzdesign.codegen.other_targets import settings_of
-    from dzdesign.codegen.project import generate as generate_project
-    from dzdesign.codegen.writing import write_generated
-    from dzdesign.design.firmware_manifest import form_named
-
-    form = form_named(arguments.calibration)
-    settings_of(target, chosen_of_outputs(arguments))
-    vectors: int = read_options(arguments, ["vectors"])["vectors"]
-    firmware = generate_project(_compensator(arguments), arguments.target, form, vectors)
-    if arguments.output is None:
-        return firmware
-    return write_generated(firmware, Path(arguments.output), over_another=arguments.replace)
-
-
-def _other_output(arguments: GenerateArguments, target: str) -> "Output":
-    """Generate an output other than a C firmware, and write it where that is asked for."""
-    from dzdesign.codegen.other_targets import OF_FIRMWARE, generate_output, settings_of
-    from dzdesign.codegen.writing import write_generated
-
-    given = chosen_of_outputs(arguments)
-    of_firmware = {name: getattr(arguments, name) for name in OF_FIRMWARE}
-    given |= {name: str(value) for name, value in of_firmware.items() if value not in (None, 0, "0")}
+    is_other, place = target in OTHER_TARGETS, None if arguments.output is None else Path(arguments.output)
+    if place is not None:
+        check_folder_may_be_written(place, schema_of(OutputManifest if is_other else FirmwareManifest))
+    given, form = chosen_of_outputs(arguments), form_named(arguments.calibration)
+    if is_other:
+        of_firmware = {name: getattr(arguments, name) for name in OF_FIRMWARE}
+        given |= {name: str(value) for name, value in of_firmware.items() if value not in (None, 0, "0")}
     settings = settings_of(target, given)
-    output = generate_output(_compensator(arguments), target, settings)
-    if arguments.output is None:
-        return output
-    return write_generated(output, Path(arguments.output), over_another=arguments.replace)
+    vectors: int = read_options(arguments, ["vectors"])["vectors"]
+    compensator, _, source = given_compensator(arguments.compensator)
+    of_file = compensator is not arguments.compensator
+    if target == "amplifier":  # whose parameters go to a device as they are printed
+        refuse_underived(compensator, source, of_file=of_file)
+    elif of_file:
+        refuse_without_options(compensator, source.strip("'"))
+    made: Firmware | Output = (
+        generate_output(compensator, target, settings)
+        if is_other
+        else generate_project(compensator, arguments.target, form, vectors)
+    )
+    return made if place is None else write_generated(made, place, over_another=arguments.replace)
 
 
 def chosen_of_outputs(arguments: OutputChoices) -> "dict[str, str | None]":
@@ -141,12 +136,3 @@ def _plant_text(path: Path) -> str:
     from dzdesign.verify.closed_loop.plant import read_plant
 
     return json.dumps({name: float(value) for name, value in asdict(read_plant(path, say)).items()})
-
-
-def _compensator(arguments: GenerateArguments) -> "Compensator":
-    from dzdesign.design.redesign import refuse_without_options
-
-    compensator, _, source = given_compensator(arguments.compensator)
-    if not isinstance(arguments.compensator, type(compensator)):
-        refuse_without_options(compensator, source.strip("'"))
-    return compensator

@@ -20,7 +20,6 @@ from dzdesign.core.options import (
     Text,
     Texts,
     arguments_of,
-    paths_of,
 )
 from dzdesign.stages.recording_choices import in_order, parts_of, stated_order
 from dzdesign.stages.recordings import (
@@ -164,8 +163,8 @@ def identify(arguments: IdentifyArguments) -> "ValveModel":
     tests = _read(arguments, options, paths)
     by_hand = read_low_flow(arguments.low_flow, options.u_max)
     refuse_copies(tests)
-    asked = None if arguments.order is None else paths_of(arguments.order)
-    tests, order = in_order(tests, paths, asked), stated_order(tests, paths, asked)
+    order = stated_order(tests, paths, arguments.order)
+    tests = in_order(tests, order)
     with stage_progress(f"fitting {len(tests)} recording{'s' if len(tests) > 1 else ''}"):
         found = identify_sides(tests, options, record, by_hand)
     stated = stated_options(arguments, order)
@@ -217,7 +216,6 @@ def read_again(options: "StatedOptions", files: Mapping[str, Path]) -> ReadAgain
         If an option or a file can't be read.
     """
     from dzdesign.identify.reading.low_flow_readings import read_low_flow
-    from dzdesign.identify.reading.series import in_stated_order
 
     known = {argument.name for argument in arguments_of(IdentifyArguments)} - {*NOT_STATED, "order"}
     given: dict[str, Any] = {**options.texts, **options.tables, **options.lists}
@@ -226,13 +224,7 @@ def read_again(options: "StatedOptions", files: Mapping[str, Path]) -> ReadAgain
         raise InputError(f"its options name {quoted(strange[0])}, which is no option of `identify`")
     arguments = IdentifyArguments([], **given)
     choices = identify_options(arguments)
-    tests = _read(arguments, choices, list(files.values()), list(files))
-    if order:
-        by_name = {test.source: test for test in tests}
-        if sorted(order) != sorted(by_name):
-            raise InputError("its option order does not name each recording once")
-        stated = {test.source: test for test in in_stated_order([by_name[name] for name in order])}
-        tests = [stated[test.source] for test in tests]
+    tests = in_order(_read(arguments, choices, list(files.values()), list(files)), order)
     return ReadAgain(options=choices, tests=tests, by_hand=read_low_flow(arguments.low_flow, choices.u_max))
 
 

@@ -134,7 +134,7 @@ def read_recordings(
     names = names or distinct_names(paths)
     tests = []
     for path, name in with_bar(list(zip(paths, names, strict=True)), what):
-        declared = _declared_dp(name, dp)
+        declared = said_of(name, dp, "dp")
         test = read_ramp_file(
             path, u_max, columns=chosen, dp=declared and parse_quantity(declared[0], "pressure", declared[1]),
             sample_rate=rate, skip_rows=skipped, missing=read_missing(missing),
@@ -205,19 +205,19 @@ def distinct_names(paths: list[Path]) -> list[str]:
     return names
 
 
-def _declared_dp(name: str, declared: Table) -> tuple[str, str] | None:
-    """Return the pressure drop that --dp or [dp] declares for a file, and where; a name goes before a pattern.
+def is_named(pattern: str, name: str) -> bool:
+    """Tell whether a name or a pattern of a table is a recording's, with its folders or without."""
+    names = name, name.rpartition("/")[2]
+    return pattern in names or any(fnmatch.fnmatchcase(each, pattern) for each in names)
 
-    The name may have folders before it, where they tell two files apart; [dp] may leave them out.
-    """
-    if declared is None:
-        return None
-    if isinstance(declared, str):
-        return declared, "--dp"
-    last = name.rpartition("/")[2]
-    patterns = [known for known in (name, last) if known in declared]
-    patterns += [each for each in declared if fnmatch.fnmatchcase(name, each) or fnmatch.fnmatchcase(last, each)]
-    return (declared[patterns[0]], f"[dp] '{patterns[0]}'") if patterns else None
+
+def said_of(name: str, table: Table, option: str) -> tuple[str, str] | None:
+    """Return what an option, or its table, says of a recording, and where; a name goes before a pattern."""
+    if table is None or isinstance(table, str):
+        return None if table is None else (table, f"--{option}")
+    patterns = [known for known in (name, name.rpartition("/")[2]) if known in table]
+    patterns += [pattern for pattern in table if is_named(pattern, name)]
+    return (table[patterns[0]], f"[{option}] '{patterns[0]}'") if patterns else None
 
 
 def _refuse_unnamed(tests: list["RampTest"], declared: Table) -> None:

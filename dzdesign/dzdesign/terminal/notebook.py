@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 from dzdesign.core.errors import one_line
 from dzdesign.terminal.design_tables import print_compensator
+from dzdesign.terminal.evidence_tables import print_output_verification, print_verification
 from dzdesign.terminal.output_tables import print_output
 from dzdesign.terminal.page import FILE_WIDTH, put_line
 from dzdesign.terminal.tables import print_firmware, print_valve
-from dzdesign.terminal.verification_tables import print_output_verification, print_verification
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -50,10 +50,10 @@ def _put_setting(console: "Console", compensator: "Compensator", settings: "Mapp
 
     setting, units = setting_of(compensator, settings), compensator.valve.recorded_units
     device, zones = setting.device, zones_of(setting, compensator)
-    words = ", ".join(f"{name} {counts}" for name, counts in setting.parameters.items())
+    words = ", ".join(f"{name} {counts}" for name, counts in setting.parameters.items()) + f" (unit {device.unit})"
     if setting.dp_MPa is not None:
         words = f"law at {units.text(float(setting.dp_MPa), '.2f MPa')}"
-    put_line(console, f"{device.title}, {device.description}: {words} (unit {device.unit})")
+    put_line(console, f"{device.title}, {device.description}: {words}")
     for sign, offset in setting.offsets.items():
         side, of_side = SIDE_NAMES[sign], units.of_side(SIDE_NAMES[sign])
         certificate = compensator.side(sign).certificate

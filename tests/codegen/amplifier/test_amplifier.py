@@ -299,6 +299,14 @@ def test_bad_input_is_one_sentence_and_nothing_is_written(words, here, capsys, w
     wording(f"amplifier output: {' '.join(words)}", printed.err)
 
 
+def test_a_compensator_whose_numbers_do_not_follow_is_refused(here, capsys, wording):
+    document = json.loads((here / "compensator.json").read_text())
+    document["sides"]["positive"]["beta"][3] += 40
+    (here / "compensator.json").write_text(json.dumps(document))
+    assert run("amplifier", "--device", "west", "-o", "made") == 2 and not (here / "made").exists()
+    wording("amplifier output: a changed beta", capsys.readouterr().err)
+
+
 def test_another_option_is_named_where_it_chose_the_output():
     with pytest.raises(InputError, match="--outputs amplifier needs --device"):
         settings_of("amplifier", {}, "--outputs")

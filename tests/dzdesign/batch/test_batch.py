@@ -498,8 +498,7 @@ def test_no_more_processes_than_have_something_to_do(monkeypatch):
     assert [useful_jobs(1000, waiting) for waiting in (0, 1, 3)] == [2, 2, 3]  # one alone would be this very process
 
 
-@pytest.mark.parametrize("jobs", ["1", "2"])
-@pytest.mark.parametrize("quiet", [False, True])
+@pytest.mark.parametrize(("jobs", "quiet"), [("1", True), ("2", False)])
 def test_a_batch_in_a_pipe_says_a_line_a_valve_and_none_if_quiet(jobs, quiet, tmp_path):
     """In a process of its own: of a worker, stderr is that of the process and not a test's."""
     write_lot(tmp_path / "lot", 2, 0, SEED)

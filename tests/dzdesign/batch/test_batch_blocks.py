@@ -9,8 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from dzdesign.batch.lot_firmware import firmware_left
-from dzdesign.batch.summary import anomalies_of
+from dzdesign.batch.summary import anomalies_of, firmware_left
 from dzdesign.batch.valve_folders import read_valve_folder
 from dzdesign.block_checks import blocks_checked, given_blocks
 from dzdesign.codegen.calibration.block import built_for

@@ -273,7 +273,7 @@ def test_what_the_command_line_says_is_not_blamed_on_the_file(refusal, bench):
 
 
 def test_an_example_for_a_part_of_a_value_is_none_for_the_whole():
-    from dzdesign.command_line.options_file import in_words_of_the_file
+    from dzdesign.command_line.invocation import in_words_of_the_file
 
     values = {"ramp_up": "0.5 s / 0.8", "ramp": "1"}
     said = in_words_of_the_file("--ramp-up is '0.8' without a unit; write for example '0.8 s'", "dz.toml", values)

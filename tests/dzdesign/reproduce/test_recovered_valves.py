@@ -14,10 +14,9 @@ from dzdesign.derivation.account.published import FIRST, SIMULATION
 from dzdesign.design.designing import design
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.reproduce import explanations, numbers
-from dzdesign.reproduce.chain import run_chain
 from dzdesign.reproduce.explanations import DISPLACEMENT, DISPLACEMENT_DEAD_ZONE, OILS
 from dzdesign.reproduce.recovered_valves import AtRest, half_digit, printed_at, recover, recover_valves
-from dzdesign.reproduce.runs import ValveRuns, run_valve
+from dzdesign.reproduce.runs import ValveRuns, run_chain, run_valve
 from dzdesign.verify.closed_loop.loop import ClosedLoop, RampSequence
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
 from tests.support.synthetic import needs_compiler

@@ -23,7 +23,7 @@ from dzdesign.design.options import DesignOptions
 from dzdesign.identify.plots.frame import saved
 from dzdesign.identify.plots.style import plot_style
 from dzdesign.identify.valve.model import ValveModel
-from dzdesign.reproduce import chain, figures, numbers, recovered_valves
+from dzdesign.reproduce import figures, numbers, recovered_valves, runs
 from dzdesign.reproduce.artefact import Reproduction
 from dzdesign.reproduce.explanations import Reason
 from dzdesign.reproduce.recovered_valves import recover_valves
@@ -44,7 +44,7 @@ FIGURES = {f"figure_{number}.svg" for number in NUMBERS}
 @pytest.fixture(scope="module")
 def reproduced(tmp_path_factory):
     """The command as a user runs it: its folder, the chains that it ran, and the figures that it drew."""
-    folder, chains, run_chain = tmp_path_factory.mktemp("reproduce") / "out", [], chain.run_chain
+    folder, chains, run_chain = tmp_path_factory.mktemp("reproduce") / "out", [], runs.run_chain
     drawn, save = [], figures.saved
 
     def kept(figure, form):
@@ -57,7 +57,7 @@ def reproduced(tmp_path_factory):
         return chains[-1]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(chain, "run_chain", recorded)
+        patch.setattr(runs, "run_chain", recorded)
         patch.setattr(figures, "saved", kept)
         assert main(["reproduce", "-o", str(folder)]) == 0
     return folder, chains, dict(zip(NUMBERS, drawn, strict=True))
@@ -66,7 +66,7 @@ def reproduced(tmp_path_factory):
 def again(chains, monkeypatch, folder, *arguments):
     """Run the command on runs that are there, without its figures."""
     known = {each.valve.valve: each for each in chains}
-    monkeypatch.setattr(chain, "run_chain", lambda valve, say: known[valve.published.name])
+    monkeypatch.setattr(runs, "run_chain", lambda valve, say: known[valve.published.name])
     monkeypatch.setattr(figures, "figure_files", lambda valves: {})
     return main(["reproduce", "-o", str(folder / "again"), *arguments])
 
@@ -91,7 +91,7 @@ def test_every_valve_and_figure_is_there_with_its_origin(reproduced):
 
 def test_the_valves_are_tested_at_the_papers_pressure_drops_only(reproduced):
     """Seeded once: a test at 1.1 MPa, which the paper has not, made all rows agree."""
-    assert chain.TESTED_MPA == (1.0, 5.0)
+    assert runs.TESTED_MPA == (1.0, 5.0)
     for valve in document_of(reproduced)["valves"]:
         assert set(valve["sha256"]["ramp_tests"]) == {"ramp_dP1.csv", "ramp_dP5.csv"}
 
@@ -300,7 +300,7 @@ def test_flow_begins_where_the_page_says(reproduced, tmp_path):
 
 
 def test_same_valve_same_bytes(reproduced):
-    first = chain.run_chain(recover_valves()[1])
+    first = runs.run_chain(recover_valves()[1])
     assert first.files == reproduced[1][1].files and first.valve == reproduced[1][1].valve
 
 
