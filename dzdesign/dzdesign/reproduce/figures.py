@@ -1,4 +1,4 @@
-"""Figures 6 to 8, 16 to 19 and 23 of the paper, redrawn from the recovered valves; marks: its numbers."""
+"""Figures 6, 7, 16 to 19 and 23 of the paper, redrawn from the recovered valves; marks: its numbers."""
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
@@ -11,7 +11,7 @@ from dzdesign.derivation.law import law
 from dzdesign.identify.plots.frame import finish, new_figure, saved
 from dzdesign.identify.plots.style import plot_style
 from dzdesign.reproduce.recovered_valves import AtRest, printed_at
-from dzdesign.reproduce.runs import DIRECT, PRESSURES_MPA, PRODUCT, STEP_AT_S, WITHOUT_BETA, ValveRuns
+from dzdesign.reproduce.runs import DIRECT, PRESSURES_MPA, PRODUCT, WITHOUT_BETA, ValveRuns
 from dzdesign.verify.closed_loop.loop import LoopRun
 
 if TYPE_CHECKING:
@@ -44,7 +44,6 @@ def figures(valves: Sequence[ValveRuns]) -> Iterator[tuple[str, "Figure"]]:
     static = "static flow without and with compensator"
     yield "06", _at_rest(simulated)
     yield "07", _over_command(7, "static characteristics (simulated valve)", simulated, _static, _without_beta)
-    yield "08", _step(simulated)
     for number, drive, mark, title in (
         (16, DIRECT, _mark_without, "dead zone over pressure drop, without compensator"),
         (17, PRODUCT, _mark_with, "simulation and test, with compensator"),
@@ -188,18 +187,3 @@ def _at_rest(runs: ValveRuns) -> "Figure":
         _mark_without(flow, runs, dp_MPa)
     displacement.set_ylabel("displacement x_e (mm)")
     return _done(figure, 2)
-
-
-def _step(runs: ValveRuns) -> "Figure":
-    """Fig. 8: the step to full command."""
-    figure, (axes,) = _new(
-        8, f"step of the command from 0 to {U_MAX_V} V (simulated valve, {DP0_MPA} MPa)",
-        "one point a period of the PWM; dynamics of the default plant, none are printed",
-    )  # fmt: skip
-    for drive, name, line, color in (
-        (DIRECT, "without compensator", WITHOUT, BLACK), (PRODUCT, "the product's C", WITH, BLUE)
-    ):  # fmt: skip
-        run = runs.steps[drive]
-        axes.plot(1e3 * (run.time - STEP_AT_S), run.q_L_min, ls=line, color=color, lw=2, label=name)
-    axes.set(xlabel="time after the step (ms)", xlim=(-5, 40))
-    return _done(figure, 1)

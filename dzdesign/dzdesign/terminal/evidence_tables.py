@@ -249,8 +249,8 @@ def summary(reproduction: "Reproduction") -> list[str]:
     """Return how many numbers are of which kind, and how many of the predicted ones agree."""
     numbers = reproduction.numbers
     predicted = [item.agrees for item in numbers if item.kind == "predicted"]
-    kinds = {kind: sum(item.kind == kind for item in numbers) for kind in ("fitted", "predicted", "given", "in words")}
-    unknown = sum(item.holds is False for item in numbers)
+    kinds = {kind: sum(item.kind == kind for item in numbers) for kind in ("fitted", "predicted")}
+    unknown = sum(not item.holds for item in numbers)
     return [
         f"{len(numbers)} numbers: " + ", ".join(f"{count} {kind}" for kind, count in kinds.items()) + ".",
         f"Of {len(predicted)} predicted {predicted.count(True)} agree and {predicted.count(False)} are missed.",
@@ -264,8 +264,8 @@ def with_unit(item: "PaperNumber") -> str:
 
 
 def verdict_of(item: "PaperNumber") -> str:
-    """Return what became of a number: nothing that was fitted, given or has no digits agrees."""
-    if item.holds is False:
+    """Return what became of a number: nothing that was fitted agrees."""
+    if not item.holds:
         return UNEXPLAINED
     if item.kind != "predicted":
         return item.kind
