@@ -232,7 +232,7 @@ def _departure(u: np.ndarray, mean: np.ndarray) -> np.ndarray:
     # The ends stand for half a step each: counted in full they pull the line to themselves.
     weights = np.ones(u.size)
     weights[[0, -1]] = math.sqrt(0.5)  # of the departure, not of its square
-    return np.abs(mean - np.polyval(np.polyfit(u, mean, 1, w=weights), u))
+    return np.asarray(np.abs(mean - np.polyval(np.polyfit(u, mean, 1, w=weights), u)))
 
 
 def _one_branch(curves: PressureCurves, used: int) -> str:

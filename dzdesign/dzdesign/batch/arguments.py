@@ -18,6 +18,8 @@ class BatchArguments(OutputChoices, DesignChoices, IdentifyChoices):
     """
 
     IN_FILE: ClassVar = (OutputChoices, DesignChoices, IdentifyChoices)
+    #: Options of `identify` that are of one valve: without them it would be another one.
+    ONE_VALVE: ClassVar = ("low_flow",)
 
     source: Annotated[AnyPath, Option("FOLDER")]
     """Folder with a subfolder of recordings for each valve, or a CSV file with a row for each valve. Its columns are

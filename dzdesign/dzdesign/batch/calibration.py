@@ -172,10 +172,7 @@ def _run(task: Task, folder: Path) -> Result:
     status, reason = _firmware(task, folder, valve, compensator, recordings)
     if status != OK:
         return Result(status, reason, tuple(_unmade(each, "the firmware does not hold") for each in task.outputs))
-    document = (out / compensator.FILE_NAME).read_bytes()
-    of = ForOutputs(
-        compensator=compensator, document=document, valve=valve, recordings=recordings, place=out, verify=task.verify
-    )
+    of = ForOutputs(compensator=compensator, valve=valve, recordings=recordings, place=out, verify=task.verify)
     outputs = tuple(make_output(each, of) for each in task.outputs)
     if outputs and task.verify:
         _report_with_outputs(out)

@@ -41,7 +41,6 @@ class ForOutputs:
     """What the outputs of one valve are made and checked of; `place` is the folder of the valve."""
 
     compensator: "Compensator"
-    document: bytes
     valve: "ValveModel"
     recordings: Sequence[Path]
     place: Path

@@ -124,7 +124,7 @@ def _meant_values(command: str, path: str, declared: tuple[Argument, ...]) -> di
     named = [argument for argument in every if not argument.is_positional and bool not in argument.kinds]
     values = options_from_file(path, named)
     own = {argument.name: argument for argument in declared if argument in named}
-    for name in getattr(command_module(command), "ONE_VALVE", ()):
+    for name in getattr(command_module(command).Arguments, "ONE_VALVE", ()):
         if name in values:
             raise InputError(
                 f"'{path}': {flag_of(name).removeprefix('--')} is of one valve, and {command} has no such option; "

@@ -7,6 +7,7 @@ import os
 import re
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
 from pathlib import Path
 from pkgutil import resolve_name
@@ -26,45 +27,37 @@ MOST_NAMES = 3
 PLAIN = re.compile(r"[\w ./*?:\[\],+@%=-]*")
 
 
+@dataclass
 class Relay:
     """A command: where its arguments and its stage are, lines for the help, and how the result is shown and judged.
 
     `show` is where the function is that prints the result, if it has more to print than the lines of `then`.
     """
 
-    def __init__(
-        self,
-        arguments: str,
-        stage: str,
-        examples: tuple[str, ...],
-        show: str,
-        then: Callable[[Any, Any], Iterable[str]],
-        *,
-        holds: Callable[[Any, Any], bool] = lambda result, arguments: True,
-        document: Callable[[Any, Any], Any] = lambda result, arguments: result,
-        one_valve: tuple[str, ...] = (),
-    ) -> None:
-        self._arguments, self._stage, self._show, self._then = arguments, stage, show, then
-        self._holds, self._document = holds, document
-        self.EXAMPLES = examples
-        #: Options of `identify` that the command does not take: without them a valve would be another one.
-        self.ONE_VALVE = one_valve
+    arguments: str
+    stage: str
+    EXAMPLES: tuple[str, ...]
+    show: str
+    then: Callable[[Any, Any], Iterable[str]]
+    _: KW_ONLY
+    holds: Callable[[Any, Any], bool] = lambda result, arguments: True
+    document: Callable[[Any, Any], Any] = lambda result, arguments: result
 
     @cached_property
     def Arguments(self) -> Any:
         """The class of the command's arguments."""
-        return resolve_name(f"dzdesign.{self._arguments}")
+        return resolve_name(f"dzdesign.{self.arguments}")
 
     def run(self, arguments: Any, json: bool) -> int:
         """Run the stage and print its result; 1 if that does not hold."""
-        result = resolve_name(f"dzdesign.{self._stage}")(arguments)
+        result = resolve_name(f"dzdesign.{self.stage}")(arguments)
         if json:
-            print_json(self._document(result, arguments))
+            print_json(self.document(result, arguments))
         else:
-            if self._show:
-                resolve_name(f"dzdesign.{self._show}")(result)
-            say_results(*self._then(result, arguments))
-        return 0 if self._holds(result, arguments) else 1
+            if self.show:
+                resolve_name(f"dzdesign.{self.show}")(result)
+            say_results(*self.then(result, arguments))
+        return 0 if self.holds(result, arguments) else 1
 
 
 def _written(result: Any, arguments: Any) -> tuple[str, ...]:
@@ -208,7 +201,6 @@ RELAYS: Mapping[str, Relay] = {
             "dzdesign batch lot.csv -o calibrated --config dzdesign.toml --verify --dask tcp://10.0.0.5:8786",
         ),
         "batch.printing:print_quantiles", _lines_of_lot, holds=_whole_lot, document=_document_of_lot,
-        one_valve=("low_flow",),
     ),
     "reproduce": Relay(
         "stages.reproduce:ReproduceArguments", "stages.reproduce:reproduce",

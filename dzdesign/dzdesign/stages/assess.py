@@ -1,6 +1,6 @@
 """`assess`: recordings without and with the compensator -> Assessment."""
 
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -88,10 +88,7 @@ def _read_set(name: str, patterns: Paths, columns: Table, arguments: AssessArgum
     if inherited:
         say("recordings after: columns as those before, by --columns or [columns]; --after-columns says others")
     try:
-        return read_recordings(
-            patterns, u_max=u_max, columns=columns, dp=arguments.dp, sample_rate=arguments.sample_rate,
-            skip_rows=arguments.skip_rows, missing=arguments.missing, what=f"reading recordings {name}",
-        )  # fmt: skip
+        return read_recordings(patterns, replace(arguments, columns=columns), u_max, f"reading recordings {name}")
     except InputError as error:
         if name == "before" or "--columns" not in str(error):
             raise

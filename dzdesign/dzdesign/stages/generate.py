@@ -109,12 +109,11 @@ def generate(arguments: GenerateArguments) -> "Firmware | Output":
         refuse_underived(compensator, source, of_file=of_file)
     elif of_file:
         refuse_without_options(compensator, source.strip("'"))
-    made: Firmware | Output = (
-        generate_output(compensator, target, settings)
-        if is_other
-        else generate_project(compensator, arguments.target, form, vectors)
-    )
-    return made if place is None else write_generated(made, place, over_another=arguments.replace)
+    if is_other:
+        output = generate_output(compensator, target, settings)
+        return output if place is None else write_generated(output, place, over_another=arguments.replace)
+    firmware = generate_project(compensator, arguments.target, form, vectors)
+    return firmware if place is None else write_generated(firmware, place, over_another=arguments.replace)
 
 
 def chosen_of_outputs(arguments: OutputChoices) -> "dict[str, str | None]":

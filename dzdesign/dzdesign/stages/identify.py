@@ -177,10 +177,7 @@ def _read(
     arguments: IdentifyArguments, options: "IdentifyOptions", paths: Paths, names: Sequence[str] = ()
 ) -> "list[RampTest]":
     """Read the recordings, those parts that are asked for."""
-    tests = read_recordings(
-        paths, u_max=options.u_max, columns=arguments.columns, dp=arguments.dp,
-        sample_rate=arguments.sample_rate, skip_rows=arguments.skip_rows, missing=arguments.missing, names=names,
-    )  # fmt: skip
+    tests = read_recordings(paths, arguments, options.u_max, names=names)
     return parts_of(tests, arguments.from_, arguments.to)
 
 

@@ -46,10 +46,8 @@ def read_sample_rate(text: str, option: str) -> float:
     return rate
 
 
-def read_missing(given: Texts | None, option: str = "--missing") -> tuple[str, ...]:
+def read_missing(given: Texts, option: str) -> tuple[str, ...]:
     """Read --missing: texts with commas between them, or one or several an item."""
-    if given is None:
-        return ()
     texts = [given] if isinstance(given, str) or not isinstance(given, Iterable) else list(given)
     if not all(isinstance(text, str) for text in texts):
         raise InputError(f"{option} is {quoted(given)}, expected texts such as 'Sensor off, -500'")
@@ -107,18 +105,10 @@ def meter_choices(arguments: RampArguments, names: Iterable[str]) -> dict[str, A
 
 
 def read_recordings(
-    patterns: Paths,
-    *,
-    u_max: float,
-    columns: Table,
-    dp: Table,
-    sample_rate: Text = None,
-    skip_rows: int | str | None = None,
-    missing: Texts | None = None,
-    what: str = "reading recordings",
+    patterns: Paths, arguments: ColumnArguments, u_max: float, what: str = "reading recordings",
     names: Sequence[str] = (),
-) -> "list[RampTest]":
-    """Read the recordings that patterns name, by the options of those names; `u_max`, V, is what 100 % means.
+) -> "list[RampTest]":  # fmt: skip
+    """Read the recordings that patterns name, with the columns of the arguments; `u_max`, V, is what 100 % means.
 
     Refuses a file that can't be read, or has no pressure drop where [dp] names those of others. `what` is for the bar;
     `names` are those of the recordings, one a file, where they are not those of the files.
@@ -127,9 +117,8 @@ def read_recordings(
     from dzdesign.identify.reading.ramp_files import read_ramp_file
     from dzdesign.identify.reading.scaling import unit_of_pressure
 
-    chosen = parse_columns(columns) if columns else {}
-    skipped = None if skip_rows is None else read_skip_rows(skip_rows, "--skip-rows")
-    rate = None if sample_rate is None else read_sample_rate(sample_rate, "--sample-rate")
+    chosen, dp = parse_columns(arguments.columns) if arguments.columns else {}, arguments.dp
+    read = read_options(arguments, ["sample_rate", "skip_rows", "missing"])
     paths = expand(patterns)
     names = names or distinct_names(paths)
     tests = []
@@ -137,14 +126,14 @@ def read_recordings(
         declared = said_of(name, dp, "dp")
         test = read_ramp_file(
             path, u_max, columns=chosen, dp=declared and parse_quantity(declared[0], "pressure", declared[1]),
-            sample_rate=rate, skip_rows=skipped, missing=read_missing(missing),
+            sample_rate=read["sample_rate"], skip_rows=read["skip_rows"], missing=read["missing"] or (),
         )  # fmt: skip
         units = test.units if declared is None else {**test.units, **unit_of_pressure(declared[0])}
         tests.append(replace(test, source=name, units=units))
     _refuse_unnamed(tests, dp)
     if dp is None and len(tests) > 1:
         for path, test in zip(paths, tests, strict=True):
-            if test.dp is None and (why := _unclear_pressures(path, chosen, skipped)):
+            if test.dp is None and (why := _unclear_pressures(path, chosen, read["skip_rows"])):
                 raise InputError(f"'{test.source}' has no column of dP: {why}")
     return tests
 

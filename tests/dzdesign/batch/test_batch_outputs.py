@@ -19,7 +19,7 @@ from dzdesign.codegen import other_targets
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import MANIFEST_NAME
 from dzdesign.core.artefact_reading import read_artefact
-from dzdesign.core.artefact_types import THIS_TOOL, to_json_bytes
+from dzdesign.core.artefact_types import THIS_TOOL
 from dzdesign.core.documents import sha256_of
 from dzdesign.core.errors import InputError
 from dzdesign.report.lot.folder import read_lot
@@ -87,7 +87,7 @@ def test_a_result_depends_on_the_outputs_that_are_wanted():
 def of_valve(tmp_path):
     compensator = golden_compensator()
     return ForOutputs(
-        compensator=compensator, document=to_json_bytes(compensator), valve=compensator.valve, recordings=(),
+        compensator=compensator, valve=compensator.valve, recordings=(),
         place=tmp_path, verify=False,
     )  # fmt: skip
 
