@@ -22,7 +22,7 @@ ROOM_SIZES = {
     "dzdesign": (8786, 59, 156),
 }
 #: Lines of Python of what is not shipped, and of the files that the tests compare with.
-TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 45002, 13953, 8473
+TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 45000, 13953, 8473
 #: Options of all commands together; an option of two commands counts twice.
 OPTIONS = 161
 #: What a number may be above what is there, before it is to be lowered.

@@ -86,10 +86,7 @@ def test_a_result_depends_on_the_outputs_that_are_wanted():
 @pytest.fixture
 def of_valve(tmp_path):
     compensator = golden_compensator()
-    return ForOutputs(
-        compensator=compensator, valve=compensator.valve, recordings=(),
-        place=tmp_path, verify=False,
-    )  # fmt: skip
+    return ForOutputs(compensator=compensator, valve=compensator.valve, recordings=(), place=tmp_path, verify=False)
 
 
 def test_without_a_verification_it_is_not_verified(of_valve):

@@ -73,10 +73,8 @@ def test_an_interrupt_names_what_was_written_before(tmp_path, monkeypatch, capsy
     monkeypatch.setattr("signal.signal", lambda *_: None)
     assert main(["doctor"]) == 130
     said = capsys.readouterr().err
-    assert (
-        said
-        == f"dzdesign: interrupted; nothing half-written was left; written before that: '{tmp_path / 'valve.json'}'\n"
-    )
+    place = tmp_path / "valve.json"
+    assert said == f"dzdesign: interrupted; nothing half-written was left; written before that: '{place}'\n"
 
 
 @pytest.mark.parametrize(("blocks", "said"), [(0, "no folder for temporary files"), (8, "a temporary file can't be")])
