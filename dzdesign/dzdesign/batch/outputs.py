@@ -9,14 +9,7 @@ from dzdesign.batch.arguments import BatchArguments
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.errors import DzdesignError, InputError, nearest
 from dzdesign.core.options import flag_of
-from dzdesign.report.lot.summary import (
-    DOES_NOT_HOLD,
-    HOLDS,
-    NOT_MADE,
-    NOT_VERIFIED,
-    OutputVerdict,
-    ValveOutput,
-)
+from dzdesign.report.lot.summary import DOES_NOT_HOLD, HOLDS, NOT_MADE, NOT_VERIFIED, OutputVerdict, ValveOutput
 from dzdesign.stages.generate import chosen_of_outputs
 
 if TYPE_CHECKING:

@@ -1,36 +1,19 @@
 """`identify`: ramp tests -> ValveModel."""
 
 import datetime
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from dzdesign.core.artefact_files import check_file_may_be_written, check_place_of_files, write_file, write_files
 from dzdesign.core.dither import read_dithered
 from dzdesign.core.errors import InputError, quoted
 from dzdesign.core.option_readers import number, percent, quantity
-from dzdesign.core.options import (
-    FIT,
-    METER,
-    RECORDINGS,
-    AnyPath,
-    Option,
-    Paths,
-    Table,
-    Text,
-    Texts,
-    arguments_of,
-)
+from dzdesign.core.options import FIT, METER, RECORDINGS, AnyPath, Option, Paths, Table, Text, Texts, arguments_of
 from dzdesign.stages.recording_choices import in_order, parts_of, stated_order
-from dzdesign.stages.recordings import (
-    RampArguments,
-    check_places,
-    expand,
-    meter_choices,
-    read_recordings,
-    refuse_copies,
-    write_results,
-)
+from dzdesign.stages.recordings import RampArguments, expand, meter_choices, read_recordings, refuse_copies
 from dzdesign.terminal.progress import stage_progress
 
 if TYPE_CHECKING:
@@ -152,13 +135,13 @@ def identify(arguments: IdentifyArguments) -> "ValveModel":
     >>> valve.positive.trend, round(valve.positive.reference.u_min_V, 2)
     ('decreasing', 5.22)
     """
+    from dzdesign.core.artefact_types import to_json_bytes
     from dzdesign.identify.identification import identify_sides
     from dzdesign.identify.plots.valve_plots import plot_files
     from dzdesign.identify.reading.low_flow_readings import read_low_flow
-    from dzdesign.identify.valve.model import ValveModel
 
     options, record = identify_options(arguments), record_of(arguments.record)
-    check_places(ValveModel, arguments.output, arguments.plots)
+    _check_places(arguments)
     paths = expand(arguments.ramps)
     tests = _read(arguments, options, paths)
     by_hand = read_low_flow(arguments.low_flow, options.u_max)
@@ -169,8 +152,30 @@ def identify(arguments: IdentifyArguments) -> "ValveModel":
         found = identify_sides(tests, options, record, by_hand)
     stated = stated_options(arguments, order)
     found = replace(found, model=replace(found.model, options=stated))
-    write_results(found.model, arguments.output, arguments.plots, lambda: plot_files(found))
+    if arguments.output is not None:
+        write_file(Path(arguments.output), to_json_bytes(found.model), found.model.schema)
+    if arguments.plots is not None:
+        with stage_progress("drawing"):
+            write_files(Path(arguments.plots), plot_files(found), "--plots")
     return found.model
+
+
+def _check_places(arguments: IdentifyArguments) -> None:
+    """Refuse places where valve.json or plots can't be written, or which would take each other's."""
+    from dzdesign.core.artefact_types import schema_of
+    from dzdesign.identify.valve.model import ValveModel
+
+    output, plots = arguments.output, arguments.plots
+    if output is not None:
+        check_file_may_be_written(Path(output), schema_of(ValveModel))
+    if plots is None:
+        return
+    if not os.fspath(plots):
+        raise InputError("--plots is empty, expected the name of a folder, such as plots")
+    folder = Path(plots)
+    check_place_of_files(folder, "--plots")
+    if output is not None and Path(output).absolute() in (folder.absolute(), *folder.absolute().parents):
+        raise InputError(f"--plots '{plots}' lies at '{output}', where -o puts a file; choose another --plots")
 
 
 def _read(

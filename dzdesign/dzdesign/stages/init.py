@@ -14,13 +14,7 @@ from dzdesign.core.display import strict_templates
 from dzdesign.core.errors import InputError, one_line
 from dzdesign.core.options import AnyPath, Option, Paths, Table, paths_of, read_options
 from dzdesign.core.recorded_units import AS_COMPUTED
-from dzdesign.stages.recordings import (
-    ColumnArguments,
-    distinct_names,
-    expand,
-    read_recordings,
-    refuse_copies,
-)
+from dzdesign.stages.recordings import ColumnArguments, distinct_names, expand, read_recordings, refuse_copies
 from dzdesign.terminal.progress import say, stage_progress, with_bar
 
 if TYPE_CHECKING:

@@ -3,38 +3,19 @@
 import fnmatch
 import glob
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from dzdesign.core.artefact_files import (
-    MANIFEST_NAME,
-    check_file_may_be_written,
-    check_place_of_files,
-    write_file,
-    write_files,
-)
+from dzdesign.core.artefact_files import MANIFEST_NAME
 from dzdesign.core.errors import InputError, nearest, neighbour, quoted
 from dzdesign.core.option_readers import percent_range, quantity, whole_number, with_tolerance
-from dzdesign.core.options import (
-    FIT,
-    METER,
-    RECORDINGS,
-    AnyPath,
-    Option,
-    Paths,
-    Table,
-    Text,
-    Texts,
-    paths_of,
-    read_options,
-)
+from dzdesign.core.options import FIT, METER, RECORDINGS, Option, Paths, Table, Text, Texts, paths_of, read_options
 from dzdesign.core.units import parse_quantity
-from dzdesign.terminal.progress import say, stage_progress, with_bar
+from dzdesign.terminal.progress import say, with_bar
 
 if TYPE_CHECKING:
-    from dzdesign.core.artefact_types import Artefact
     from dzdesign.identify.reading.ramp_test import RampTest
 
 
@@ -240,32 +221,3 @@ def refuse_copies(tests: Sequence["RampTest"]) -> None:
             f"{copy.compared} rows with flow are in both. Give it once. A repeated ramp test is welcome, but a copy is "
             "no repetition, nor is a second run of a simulation without noise"
         )
-
-
-def check_places(kind: "type[Artefact]", output: AnyPath | None, plots: AnyPath | None) -> None:
-    """Refuse places where the artefact or its plots can't be written, or which would take each other's."""
-    from dzdesign.core.artefact_types import schema_of
-
-    if output is not None:
-        check_file_may_be_written(Path(output), schema_of(kind))
-    if plots is None:
-        return
-    if not os.fspath(plots):
-        raise InputError("--plots is empty, expected the name of a folder, such as plots")
-    folder = Path(plots)
-    check_place_of_files(folder, "--plots")
-    if output is not None and Path(output).absolute() in (folder.absolute(), *folder.absolute().parents):
-        raise InputError(f"--plots '{plots}' lies at '{output}', where -o puts a file; choose another --plots")
-
-
-def write_results(
-    artefact: "Artefact", output: AnyPath | None, plots: AnyPath | None, draw: Callable[[], Mapping[str, bytes]]
-) -> None:
-    """Write an artefact, and the plots that `draw` returns, where places are named for them."""
-    from dzdesign.core.artefact_types import to_json_bytes
-
-    if output is not None:
-        write_file(Path(output), to_json_bytes(artefact), artefact.schema)
-    if plots is not None:
-        with stage_progress("drawing"):
-            write_files(Path(plots), draw(), "--plots")
