@@ -19,7 +19,7 @@ API = (
     (
         "dzdesign.api",
         (
-            "identify", "design", "generate", "calibration", "read_calibration", "export", "verify", "init",
+            "identify", "design", "generate", "calibration", "read_calibration", "verify", "init",
             "simulate", "assess", "report", "batch",
         ),
     ),
@@ -37,9 +37,6 @@ API = (
     ("dzdesign.design.compensator", ("Compensator", "SideLaw")),
     ("dzdesign.codegen.project", ("generate", "Firmware")),
     ("dzdesign.stages.calibration", ("CalibrationImage", "ReadCalibration")),
-    ("dzdesign.stages.export", ("AmplifierExport",)),
-    ("dzdesign.codegen.amplifier.setting", ("AmplifierSetting",)),
-    ("dzdesign.design.fixed_offset", ("FixedDeadZone",)),
     ("dzdesign.codegen.calibration.reading", ("CalibrationReading", "SideReading", "NodeReading", "DriveReading")),
     ("dzdesign.verify.closed_loop.plant", ("Plant", "read_plant")),
     ("dzdesign.verify.verification", ("verify", "Verification")),

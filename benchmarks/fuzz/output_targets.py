@@ -9,7 +9,7 @@ import numpy as np
 from target import Target
 
 from dzdesign.codegen.amplifier.device import DEVICE_NAMES, device_named
-from dzdesign.codegen.amplifier.files import amplifier_file, is_file_of
+from dzdesign.codegen.amplifier.files import amplifier_file
 from dzdesign.codegen.amplifier.setting import amplifier_setting
 from dzdesign.codegen.other_targets import Output, generate_output
 from dzdesign.core.artefact_types import to_json_bytes
@@ -52,13 +52,11 @@ def output_manifest() -> bytes:
 def _amplifier(data: bytes) -> None:
     for name in READERS:
         amplifier_checks(name, data, compensator(), _stated())
-    for name in DEVICE_NAMES:
-        is_file_of(device_named(name), data)
 
 
 @cache
 def _stated() -> dict[int, list[tuple[float, Mapping[str, float]]]]:
-    """Return what `export` states of the dead zones."""
+    """Return what is stated of the dead zones."""
     made = compensator()
     found = amplifier_setting(made, device_named("csv")).characteristics
     return {sign: [(row.dp_MPa, row.fixed) for row in dead_zones(made, drives, sign)] for sign, drives in found.items()}

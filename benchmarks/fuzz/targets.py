@@ -12,8 +12,8 @@ import output_targets
 from target import Target
 
 from dzdesign.assess.assessment import Assessment
-from dzdesign.assess.limits import parse_limits
-from dzdesign.command_line.options_file import options_from_file
+from dzdesign.assess.quantities import parse_limits
+from dzdesign.command_line.invocation import options_from_file
 from dzdesign.command_line.parser import arguments_of_command
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import schema_of, to_json_bytes

@@ -5,8 +5,8 @@ Each function takes paths or the result of the previous stage. Options are writt
 ``output`` a function also writes the file or folder of the command of the same stage, byte for byte. Nothing is
 printed, and heavy packages are imported when a stage is called.
 
-`init`, `simulate`, `assess`, `report`, `batch`, `calibration` and `export` correspond to the commands of
-the same names; `read_calibration` corresponds to `calibration --read`.
+`init`, `simulate`, `assess`, `report`, `batch` and `calibration` correspond to the commands of the same names;
+`read_calibration` corresponds to `calibration --read`.
 
 >>> from dzdesign import api
 >>> valve = api.identify("ramps/*.csv", meter_lag="0.1 s")         # doctest: +SKIP
@@ -24,7 +24,6 @@ from dzdesign.stages import assess as assess_stage
 from dzdesign.stages import batch as batch_stage
 from dzdesign.stages import calibration as calibration_stage
 from dzdesign.stages import design as design_stage
-from dzdesign.stages import export as export_stage
 from dzdesign.stages import generate as generate_stage
 from dzdesign.stages import identify as identify_stage
 from dzdesign.stages import init as init_stage
@@ -35,7 +34,7 @@ from dzdesign.terminal.notebook import heading_of, html_of, text_of
 
 __all__ = [
     "DzdesignError", "InputError", "RequirementError",
-    "assess", "batch", "calibration", "design", "export", "generate", "identify", "init", "read_calibration",
+    "assess", "batch", "calibration", "design", "generate", "identify", "init", "read_calibration",
     "report", "simulate", "verify",
 ]  # fmt: skip
 
@@ -53,7 +52,6 @@ design = with_keywords(design_stage.DesignArguments, design_stage.design)
 generate = with_keywords(generate_stage.GenerateArguments, generate_stage.generate)
 calibration = with_keywords(calibration_stage.CalibrationArguments, calibration_stage.calibration)
 read_calibration = with_keywords(calibration_stage.ReadCalibrationArguments, calibration_stage.read_calibration)
-export = with_keywords(export_stage.ExportArguments, export_stage.export)
 verify = with_keywords(verify_stage.VerifyArguments, verify_stage.verify)
 simulate = with_keywords(simulate_stage.SimulateArguments, simulate_stage.simulate)
 assess = with_keywords(assess_stage.AssessArguments, assess_stage.assess)

@@ -6,7 +6,6 @@ Thresholds, bounds and hashes that were edited together fit one another; the rec
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -139,25 +138,20 @@ ROUNDING = 1e-6
 MOST_NAMED = 6
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class GivenFiles:
-    """The files that are said to be a valve's recordings, by the SHA-256 of their content."""
-
-    paths: Mapping[str, Path]
-
-    @classmethod
-    def read(cls, patterns: Paths) -> "GivenFiles":
-        """Hash the files that patterns name; refuse one that can't be read or is given twice."""
-        paths: dict[str, Path] = {}
-        for path in expand(patterns):
-            digest = sha256_of(read_bytes(path, "ramp file"))
-            if digest in paths:
-                raise InputError(f"--ramps: '{path}' is the same recording as '{paths[digest]}'; give it once")
-            paths[digest] = path
-        return cls(paths=paths)
+def given_files(patterns: Paths) -> dict[str, Path]:
+    """Return the files that patterns name, by the SHA-256 of their content; refuse one that is given twice."""
+    paths: dict[str, Path] = {}
+    for path in expand(patterns):
+        digest = sha256_of(read_bytes(path, "ramp file"))
+        if digest in paths:
+            raise InputError(f"--ramps: '{path}' is the same recording as '{paths[digest]}'; give it once")
+        paths[digest] = path
+    return paths
 
 
-def identified_again(compensator: "Compensator", given: GivenFiles, identified: "ValveModel | None" = None) -> "Check":
+def identified_again(
+    compensator: "Compensator", given: Mapping[str, Path], identified: "ValveModel | None" = None
+) -> "Check":
     """Tell whether identifying again, from the recordings that a compensator's valve names, gives the same valve.
 
     Which file is which its hash decides, whatever its name, its folder and the order. What this very run has
@@ -173,9 +167,9 @@ def identified_again(compensator: "Compensator", given: GivenFiles, identified: 
         )
         return _check(holds=None, text=text)
     stated = {each.sha256: each.source for each in valve.made_from}
-    if foreign := [path for digest, path in given.paths.items() if digest not in stated]:
+    if foreign := [path for digest, path in given.items() if digest not in stated]:
         return _check(holds=False, text=_about_foreign(foreign[0], given, stated))
-    if missing := [name for digest, name in stated.items() if digest not in given.paths]:
+    if missing := [name for digest, name in stated.items() if digest not in given]:
         text = f"valve.json was made from {len(stated)} files, and --ramps lacks {and_more(missing, MOST_NAMED)}"
         return _check(holds=None, text=f"{text}; give all of them")
     if valve.options is None:
@@ -183,7 +177,7 @@ def identified_again(compensator: "Compensator", given: GivenFiles, identified: 
         return _check(holds=None, text=text)
     if len({each.source for each in valve.made_from}) < len(valve.made_from):
         return _check(holds=False, text="valve.json names two of its files alike; make it again")
-    files = {each.source: given.paths[each.sha256] for each in valve.made_from}
+    files = {each.source: given[each.sha256] for each in valve.made_from}
     try:
         found = identified or identify_again(valve.options, valve.record, files)
     except InputError as error:
@@ -203,7 +197,7 @@ def identified_again(compensator: "Compensator", given: GivenFiles, identified: 
     return _check(holds=True, text=text)
 
 
-def inputs_again(compensator: "Compensator", given: GivenFiles) -> "list[Check]":
+def inputs_again(compensator: "Compensator", given: Mapping[str, Path]) -> "list[Check]":
     """Tell whether the pressure inputs of a compensator for both signs, wired as recorded, give the recorded drop."""
     from dzdesign.verify.exhaustive.recorded_inputs import recorded_inputs_follow
     from dzdesign.verify.requirements import PRESSURE_INPUTS
@@ -212,9 +206,9 @@ def inputs_again(compensator: "Compensator", given: GivenFiles) -> "list[Check]"
     if compensator.negative is None:
         return []
     stated = {each.sha256: each.source for each in valve.made_from}
-    if set(stated) != set(given.paths) or valve.options is None:
+    if set(stated) != set(given) or valve.options is None:
         return [PRESSURE_INPUTS.check(holds=None, text="--ramps are not the files that valve.json was made from")]
-    files = {each.source: given.paths[each.sha256] for each in valve.made_from}
+    files = {each.source: given[each.sha256] for each in valve.made_from}
     try:
         tests = read_again(valve.options, files).tests
     except InputError as error:
@@ -228,11 +222,11 @@ def _check(*, holds: bool | None, text: str) -> "Check":
     return RAMPS.check(holds=holds, text=one_line(text))  # names and options of a file that anyone may have written
 
 
-def _about_foreign(path: Path, given: GivenFiles, stated: Mapping[str, str]) -> str:
+def _about_foreign(path: Path, given: Mapping[str, Path], stated: Mapping[str, str]) -> str:
     """Say of a file that valve.json was not made from it, or that it is another one of the same name."""
-    digest = next(digest for digest, other in given.paths.items() if other == path)
+    digest = next(digest for digest, other in given.items() if other == path)
     namesakes = [known for known, name in stated.items() if name.rpartition("/")[2] == path.name]
-    if namesakes and not any(known in given.paths for known in namesakes):
+    if namesakes and not any(known in given for known in namesakes):
         return f"'{path}' has the SHA-256 {digest}, but valve.json was made from a {path.name} of {namesakes[0]}"
     return (
         f"valve.json was not made from '{path}' (SHA-256 {digest}), but from {len(stated)} other files; leave it out, "

@@ -115,7 +115,7 @@ def test_list_targets_is_a_line_each(capsys):
     assert [entry["name"] for entry in listed] == list(ALL_TARGET_NAMES)
 
 
-@pytest.mark.parametrize("command", [["design", str(VALVE)], ["codegen", str(VALVE)]])
+@pytest.mark.parametrize("command", [["design", str(VALVE)], ["codegen", "compensator.json"]])
 def test_a_wrong_target_names_the_nearest_and_writes_nothing(command, tmp_path, capsys, wording):
     assert main([*command, "--target", "cortex-m3", "-o", str(tmp_path / "out")]) == 2
     wording.of_test(capsys.readouterr().err)
@@ -130,18 +130,14 @@ def test_codegen_without_a_source_says_so(capsys, wording):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", TARGET_NAMES)
 def test_design_and_codegen_fit_the_target(name, tmp_path, capsys):
-    """From a valve codegen designs by itself, and that is what design and codegen do one after the other."""
     target = target_named(name)
-    compensator, one, two = (tmp_path / part for part in ("compensator.json", "one", "two"))
+    compensator, one = tmp_path / "compensator.json", tmp_path / "one"
     assert main(["design", str(VALVE), "--target", name, "-o", str(compensator)]) == 0
     signals = json.loads(compensator.read_text())["signals"]
     assert signals["compare_max"] == target.compare_max
     assert signals["code_max"] == signals["command"]["full_code"] == target.converter.code_max
     assert main(["codegen", str(compensator), "--target", name, "-o", str(one)]) == 0
-    assert main(["codegen", str(VALVE), "--target", name, "-o", str(two)]) == 0
-    files = {path.relative_to(one): path.read_bytes() for path in one.rglob("*") if path.is_file()}
-    assert len(files) > 5
-    assert files == {path.relative_to(two): path.read_bytes() for path in two.rglob("*") if path.is_file()}
+    assert len([path for path in one.rglob("*") if path.is_file()]) > 5
     assert json.loads((one / "manifest.json").read_text())["target"] == name
 
 

@@ -31,8 +31,9 @@ def firmware(tmp_path):
 
     def generated(target: str, *options: str, both: bool = False) -> Path:
         valve = (FULL if both else GOLDENS) / "valve.json"
-        folder = tmp_path / "firmware"
-        assert main(["codegen", str(valve), "--target", target, *options, "--replace", "-o", str(folder)]) == 0
+        folder, compensator = tmp_path / "firmware", str(tmp_path / "compensator.json")
+        assert main(["design", str(valve), "--target", target, *options, "-o", compensator]) == 0
+        assert main(["codegen", compensator, "--replace", "-o", str(folder)]) == 0
         return folder
 
     return generated

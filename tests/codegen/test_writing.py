@@ -42,17 +42,20 @@ def contents(folder):
 
 @pytest.fixture
 def codegen(capsys, tmp_path):
-    """Run `codegen` into one folder; returns exit status and what was said beside the files."""
+    """Run `design`, and `codegen` into one folder; returns its status and what it says beside the files."""
 
-    def run(source, *options):
-        status = main(["codegen", str(source), "--target", "host", "-o", str(tmp_path / "firmware"), *options])
+    def run(source, *options, replace=()):
+        made = str(tmp_path / "compensator.json")
+        assert main(["design", str(source), "-o", made, *options]) == 0
+        capsys.readouterr()
+        status = main(["codegen", made, "--target", "host", "-o", str(tmp_path / "firmware"), *replace])
         return status, capsys.readouterr().err
 
     return run
 
 
 def test_the_default_design_does_not_go_over_a_bipolar_one(codegen, tmp_path):
-    """Seeded: a firmware for two solenoids, then `codegen valve.json` with no options into the same folder."""
+    """Seeded: a firmware for two solenoids, then of the same valve with no options into the same folder."""
     status, said = codegen(BOTH_SIDES, *BIPOLAR)
     assert status == 0 and "left out" not in said
     before = contents(tmp_path / "firmware")
@@ -60,7 +63,7 @@ def test_the_default_design_does_not_go_over_a_bipolar_one(codegen, tmp_path):
     assert status == 2 and contents(tmp_path / "firmware") == before
     assert "two solenoids, this one one solenoid" in said and "--command-signal '-10..10 V" in said
     assert "--replace" in said and "-o" in said
-    status, said = codegen(BOTH_SIDES, "--replace")
+    status, said = codegen(BOTH_SIDES, replace=["--replace"])
     assert status == 0 and "warning: the valve's negative side is left out" in said
     assert "dz_comp_negative" not in (tmp_path / "firmware/core/dz_comp.h").read_text()
     assert codegen(BOTH_SIDES)[0] == 0  # now it is the same design

@@ -15,7 +15,7 @@ from nbclient import NotebookClient
 
 from dzdesign import api
 from dzdesign.command_line.cli import main
-from dzdesign.command_line.parser import arguments_of_command
+from dzdesign.command_line.parser import arguments_of_command, in_file
 from dzdesign.identify.valve.model import ValveModel
 from tests.support.html_pages import Page
 from tests.support.paths import ROOT
@@ -54,7 +54,8 @@ def test_the_api_writes_the_bytes_of_the_commands(ramps, tmp_path, monkeypatch, 
 def test_the_options_are_those_of_the_commands():
     for command in ("init", "identify", "design", "codegen", "verify", "simulate", "assess", "report", "batch"):
         function = getattr(api, "generate" if command == "codegen" else command)
-        options = [argument.name for argument in arguments_of_command(command) if argument.name != "list_targets"]
+        arguments = (*arguments_of_command(command), *in_file(command))
+        options = [argument.name for argument in arguments if argument.name != "list_targets"]
         assert set(inspect.signature(function).parameters) == set(options)
         for name in options:
             assert re.search(rf"^{name} : \w+", inspect.getdoc(function), re.MULTILINE), (command, name)
@@ -162,8 +163,8 @@ def test_what_stands_around_the_stages_writes_the_bytes_of_the_commands(tmp_path
     compared = {"limits": {"dead_zone_opening": "60 %"}, "meter_lag": "0.1 s", "output": "api_assessment.json"}
     assert api.assess("lot/V1/*.gz", "after/*.gz", **compared).holds
     pairs.append(("assessment.json", "api_assessment.json"))
-    choices = ["--meter-lag", "0.1 s", "--guard", "mean", "--curve", "line", "--jobs", "1"]
-    assert main(["batch", "lot", *choices, "-o", "done"]) == 0
+    Path("lot.toml").write_text('meter-lag = "0.1 s"\nguard = "mean"\ncurve = "line"\n')
+    assert main(["batch", "lot", "--config", "lot.toml", "--jobs", "1", "-o", "done"]) == 0
     capsys.readouterr()
     said = {"meter_lag": "0.1 s", "guard": "mean", "curve": "line", "jobs": 1}
     summary = api.batch(Path("lot"), output=Path("api_done"), **said)

@@ -97,12 +97,6 @@ def test_identify_says_the_direction_and_what_to_type_next(tmp_path, monkeypatch
     assert '\n# command-signal = "-10..10 V' in options and '\nnegative-dp = "recorded"\n' in options
     # As written, it is no contradiction to a command of one sign.
     assert main(["design", "valve.json", "--config", "dzdesign.toml"]) == 0
-    # Nor to the design that it was made for: one file is for all commands.
-    assert main(["codegen", "compensator.json", "--config", "dzdesign.toml", "--target", "host"]) == 0
-    capsys.readouterr()
-    with_swapped = ["codegen", "compensator.json", "--config", "dzdesign.toml", "--negative-dp", "swapped"]
-    assert main([*with_swapped, "--target", "host"]) == 2
-    assert "--negative-dp is 'swapped', but 'compensator.json' was designed with 'recorded'" in capsys.readouterr().err
 
 
 def test_what_nobody_asked_for_is_not_called_unchecked():

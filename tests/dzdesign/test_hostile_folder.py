@@ -117,7 +117,7 @@ OF_A_DAY = (
     ("codegen", "{out}/compensator.json", "--target", "matlab", "-o", "{out}/matlab"),
     ("calibration", "{out}/compensator.json", "-o", "{out}/block.hex"),
     ("calibration", "--read", "{out}/block.hex"),
-    ("export", "{out}/compensator.json", "--to", "csv", "-o", "{out}/table.csv"),
+    ("codegen", "{out}/compensator.json", "--target", "amplifier", "--device", "csv", "-o", "{out}/amplifier"),
     ("verify", "{out}/plc", "-o", "{out}/plc_evidence"),
     ("verify", "{out}/matlab", "-o", "{out}/matlab_evidence"),
     ("batch", "{lot}/valves.csv", "-o", "{out}/lot", "--jobs", "2", "--target", "host"),

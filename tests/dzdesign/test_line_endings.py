@@ -10,7 +10,7 @@ import pytest
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.documents import sha256_of
-from dzdesign.regeneration import GivenFiles, identified_again
+from dzdesign.regeneration import given_files, identified_again
 from tests.support.attacked_firmware import take_the_rest_as_held
 from tests.support.paths import ROOT
 from tests.support.synthetic import needs_compiler
@@ -102,5 +102,5 @@ def test_recordings_that_differ_in_line_endings_only_are_the_same(tmp_path, monk
     from dzdesign.design.compensator import Compensator
 
     compensator = read_artefact(Path("compensator.json").read_bytes(), Compensator, "compensator.json")
-    check = identified_again(compensator, GivenFiles.read([f"windows/{name}" for name in dict.fromkeys(names)]))
+    check = identified_again(compensator, given_files([f"windows/{name}" for name in dict.fromkeys(names)]))
     assert check.holds, check.text

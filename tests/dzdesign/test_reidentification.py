@@ -12,7 +12,7 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.documents import sha256_of
 from dzdesign.core.errors import InputError
 from dzdesign.identify.valve.model import ValveModel
-from dzdesign.regeneration import GivenFiles, identified_again, regenerated
+from dzdesign.regeneration import given_files, identified_again, regenerated
 from dzdesign.verify.folder import reproduced
 from dzdesign.verify.requirements import AS_STATED
 from tests.support.attacked_firmware import sealed
@@ -36,7 +36,7 @@ def valve(ramps):
 
 
 def tried(valve, files):
-    return identified_again(api.design(valve), GivenFiles.read([str(file) for file in files]))
+    return identified_again(api.design(valve), given_files([str(file) for file in files]))
 
 
 def in_folder(ramps):

@@ -46,7 +46,8 @@ def test_knees_of_both_branches_at_every_pressure(artefacts):
 @pytest.mark.slow
 @needs_compiler
 def test_firmware_from_them_is_verified(artefacts, capsys):
-    assert main(["codegen", str(artefacts / "valve.json"), "-o", str(artefacts / "fw")]) == 0
+    assert main(["design", str(artefacts / "valve.json"), "-o", str(artefacts / "compensator.json")]) == 0
+    assert main(["codegen", str(artefacts / "compensator.json"), "-o", str(artefacts / "fw")]) == 0
     assert main(["verify", str(artefacts / "fw"), "-o", str(artefacts / "evidence")]) == 0
     evidence = json.loads((artefacts / "evidence" / "verification.json").read_text())
     assert [(each["inputs"], each["wrong"]) for each in evidence["inputs"]] == [(INPUTS, 0)]
@@ -93,6 +94,6 @@ def test_measured_valve_without_pressure_is_one_pressure_and_says_so(tmp_path, c
     u, q = np.loadtxt(SHARED / "real" / "pvp_psol.csv", delimiter=",", skiprows=1, usecols=(1, 2)).T
     falling = np.arange(u.size) > np.argmax(u)
     assert q[falling & (u <= test["u_guard_lower_V"])].max() < 0.005 * bracket["Qmax"]
-    assert main(["codegen", str(path), "-o", str(tmp_path / "fw")]) == 2
+    assert main(["design", str(path), "-o", str(tmp_path / "compensator.json")]) == 2
     assert "without a pressure drop" in capsys.readouterr().err
-    assert not (tmp_path / "fw").exists()
+    assert not (tmp_path / "compensator.json").exists()

@@ -108,7 +108,8 @@ def test_the_installed_program_runs_the_example_and_its_stages_without_the_clone
     ramps = [str(path) for path in sorted((installed / "dzdesign" / "paper_valve" / "ramps").glob("*.csv.gz"))]
     for words in (
         ["identify", *ramps, "--meter-lag", "0.1 s", "--meter-floor", "0.6 L/min"],
-        ["codegen", "valve.json", "-o", "firmware"],
+        ["design", "valve.json"],
+        ["codegen", "compensator.json", "-o", "firmware"],
         ["verify", "firmware", "-o", "evidence"],
         ["report", "."],
     ):

@@ -12,7 +12,7 @@ import pytest
 
 from dzdesign.assess.assessing import assess
 from dzdesign.assess.options import AssessOptions
-from dzdesign.assess.thinned_curves import Line, gain_of, hysteresis_of, linearity_of
+from dzdesign.assess.readings import Line, gain_of, hysteresis_of, linearity_of
 from dzdesign.core.recorded_units import AS_COMPUTED, FlowUnit, RecordedUnits
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions

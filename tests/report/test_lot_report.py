@@ -26,11 +26,11 @@ from dzdesign.report.lot.spread import FAR, LEVELS, quantiles, spread_figure, sp
 from dzdesign.report.lot.summary import LotSettingSummary, SmallestMargin, UntestedPressures
 from dzdesign.report.lot.table import SIDE_COLUMNS, frame_of
 from tests.support.html_pages import HOSTILE, Page
-from tests.support.many_valves import write_lot
+from tests.support.many_valves import LOT_TOML, write_lot
 from tests.support.schema_checks import overlooked, problems
 from tests.support.synthetic_lots import lot_rows, with_figures, write_lot_folder
 
-OPTIONS = ["--meter-lag", "0.1 s", "--target", "host", "--jobs", "1"]
+OPTIONS = ["--config", str(LOT_TOML), "--target", "host", "--jobs", "1"]
 
 
 @pytest.fixture(scope="module")

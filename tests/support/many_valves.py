@@ -12,6 +12,8 @@ L_MIN, MPA = 1e-3 / 60, 1e6
 PRESSURES_MPa = (1.0, 2.5, 5.0)
 #: Ten rows a second of 60 s each way: what an end-of-line bench has time for.
 RATE_Hz, RAMP_s = 10.0, 60.0
+#: The lag of the bench's meter, for `batch --config`.
+LOT_TOML = Path(__file__).with_name("lot.toml")
 
 
 def lot_bench(number: int, seed: int) -> Bench:
@@ -107,3 +109,10 @@ def write_lot(folder: Path, count: int, broken: int, seed: int) -> dict[str, str
         for file, content in files.items():
             (folder / name / file).write_bytes(content)
     return names
+
+
+def lot_options(folder: Path, text: str) -> list[str]:
+    """Return the words for `batch` that give every valve the lot's lag and the options of a text."""
+    path = folder / "options.toml"
+    path.write_text(f"{LOT_TOML.read_text()}{text}\n", encoding="utf-8")
+    return ["--config", str(path)]

@@ -2,17 +2,17 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Annotated, ClassVar, Literal
 
 from msgspec import UNSET, Meta, UnsetType
 
-from dzdesign.assess.limits import LimitResult
-from dzdesign.assess.measured_curves import MeasuredCurve
 from dzdesign.assess.options import Set, Side
-from dzdesign.assess.quantities import Change, Quantity, Reading
+from dzdesign.assess.quantities import Change, LimitResult, Quantity, Reading
 from dzdesign.core.artefact_types import Artefact, RuleError, SourceFile, quantity
 from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
 from dzdesign.identify.valve.model import Warning_
+from dzdesign.identify.valve.ramp_conditions import RampConditions
 
 TERMS = (
     "terms as in tests of hydraulic valves (ISO 10770-1); the formulas are dzdesign's own, and no conformity with a "
@@ -23,6 +23,51 @@ Share = Annotated[float, Meta(ge=0, le=1)]
 Flow = Annotated[float, Meta(ge=0, le=1e9, extra_json_schema={"unit": "L/min"})]
 PressureDrop = Annotated[float, Meta(ge=0, le=1e6, extra_json_schema={"unit": "MPa"})]
 Voltage = Annotated[float, Meta(gt=0, le=1e9, extra_json_schema={"unit": "V"})]
+#: Largest command in percent of full command, and largest flow, that a file may state.
+LARGEST_PERCENT, LARGEST_FLOW = 1e4, 1e6
+
+Percents = tuple[Annotated[float, Meta(ge=-LARGEST_PERCENT, le=LARGEST_PERCENT)], ...]
+Flows = tuple[Annotated[float, Meta(ge=-LARGEST_FLOW, le=LARGEST_FLOW)], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MeasuredBranch:
+    """One branch: flow over command, linear between the points, and a few of its samples.
+
+    On the negative side commands and flows count from zero down, as in valve.json.
+    """
+
+    command_percent: Annotated[Percents, quantity("%")]
+    """Commands of the points in ascending order, as a percentage of full command."""
+    q_L_min: Annotated[Flows, quantity("L/min")]
+    """Flow at each point, scaled to the pressure drop at zero flow."""
+    sample_command_percent: Annotated[Percents, quantity("%")]
+    """Commands of single samples. The branch is divided into equal steps; the sample nearest to each step is kept."""
+    sample_q_L_min: Annotated[Flows, quantity("L/min")]
+    """Flow of each single sample, scaled to the same pressure drop."""
+
+    def __post_init__(self) -> None:
+        for commands, flows in (
+            (self.command_percent, self.q_L_min), (self.sample_command_percent, self.sample_q_L_min)
+        ):  # fmt: skip
+            if len(commands) != len(flows):
+                raise RuleError(f"{len(commands)} commands stand beside {len(flows)} flows, expected one each")
+        if not all(left < right for left, right in pairwise(self.command_percent)):
+            raise RuleError("the commands of a measured curve must rise")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MeasuredCurve:
+    """The curve of one set at one pressure drop; a branch that was not recorded is null."""
+
+    rising: Annotated[MeasuredBranch | None, Meta(description="Opening branch.")]
+    falling: Annotated[MeasuredBranch | None, Meta(description="Closing branch.")]
+    conditions: Annotated[RampConditions, Meta(description="Conditions under which the ramps were recorded.")]
+
+    @property
+    def branches(self) -> tuple[MeasuredBranch, ...]:
+        """The branches that were recorded, the rising one first."""
+        return tuple(branch for branch in (self.rising, self.falling) if branch)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

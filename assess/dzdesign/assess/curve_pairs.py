@@ -16,22 +16,13 @@ from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.reading.scaling import units_of
 from dzdesign.identify.valve.model import SIDES
 
-Pair = tuple[PressureCurves | None, PressureCurves | None]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CurvePair:
-    """The curves of one side at one pressure drop; None where a set has no recording there."""
+    """The curves of one side at one pressure drop, by the name of their set; one of them may be missing."""
 
     side: Side
-    before: PressureCurves | None
-    after: PressureCurves | None
-
-    @property
-    def sets(self) -> dict[Set, PressureCurves]:
-        """The curves that there are, by the name of their set."""
-        both = zip(SETS, (self.before, self.after), strict=True)
-        return {name: curves for name, curves in both if curves is not None}
+    sets: Mapping[Set, PressureCurves]
 
     @property
     def first(self) -> PressureCurves:
@@ -73,27 +64,23 @@ def compare_curves(before: Sequence[RampTest], after: Sequence[RampTest], option
             which = "without" if name == "before" else "with"
             raise InputError(f"no recordings {which} the compensator were given; expected at least one file")
     with shown_in(units_of([*before, *after])):
-        return _compared(sets, options)
-
-
-def _compared(sets: Mapping[Set, Sequence[RampTest]], options: AssessOptions) -> Comparison:
-    of_sides = {
-        (side, name): tests_of_side(tests, SIDES[side], options.of_set(name).u_max)
-        for side in BOTH_SIDES
-        for name, tests in sets.items()
-    }
-    floor, lag = _meter(of_sides, options)
-    curves = {
-        (side, name): read_curves(tests, options.of_set(name), floor=floor, lag=lag.seconds) if tests else []
-        for (side, name), tests in of_sides.items()
-    }
-    pairs = tuple(
-        CurvePair(side=side, before=one, after=other)
-        for side in BOTH_SIDES
-        for one, other in _paired(curves[side, "before"], curves[side, "after"])
-    )
-    if not any(pair.before and pair.after for pair in pairs):
-        raise InputError(_no_pressure_in_common(pairs))
+        of_sides = {
+            (side, name): tests_of_side(tests, SIDES[side], options.of_set(name).u_max)
+            for side in BOTH_SIDES
+            for name, tests in sets.items()
+        }
+        floor, lag = _meter(of_sides, options)
+        curves = {
+            (side, name): read_curves(tests, options.of_set(name), floor=floor, lag=lag.seconds) if tests else []
+            for (side, name), tests in of_sides.items()
+        }
+        pairs = tuple(
+            CurvePair(side=side, sets=found)
+            for side in BOTH_SIDES
+            for found in _paired(curves[side, "before"], curves[side, "after"])
+        )
+        if not any(len(pair.sets) == len(SETS) for pair in pairs):
+            raise InputError(_no_pressure_in_common(pairs))
     return Comparison(options=options, tests=sets, floor=floor, lag=lag, pairs=pairs)
 
 
@@ -118,11 +105,8 @@ def _meter(of_sides: Mapping[tuple[Side, Set], Sequence[RampTest]], options: Ass
     )
 
 
-def _paired(before: Sequence[PressureCurves], after: Sequence[PressureCurves]) -> list[Pair]:
-    """Pair curves whose pressure drops agree within `SAME_PRESSURE`, the nearest first; None stands for no partner.
-
-    The pairs come in the order of rising pressure drop.
-    """
+def _paired(before: Sequence[PressureCurves], after: Sequence[PressureCurves]) -> list[dict[Set, PressureCurves]]:
+    """Pair curves whose pressure drops agree within `SAME_PRESSURE`, the nearest first; by rising pressure drop."""
     distances = sorted(
         (relative_distance(one.dp, other.dp), row, column)
         for row, one in enumerate(before)
@@ -132,11 +116,12 @@ def _paired(before: Sequence[PressureCurves], after: Sequence[PressureCurves]) -
     for distance, row, column in distances:
         if distance <= SAME_PRESSURE and row not in partner and column not in partner.values():
             partner[row] = column
-    pairs: list[tuple[float, Pair]] = [
-        (one.dp or 0.0, (one, after[partner[row]] if row in partner else None)) for row, one in enumerate(before)
+    pairs: list[dict[Set, PressureCurves]] = [
+        {"before": one, "after": after[partner[row]]} if row in partner else {"before": one}
+        for row, one in enumerate(before)
     ]
-    pairs += [(one.dp or 0.0, (None, one)) for column, one in enumerate(after) if column not in partner.values()]
-    return [pair for _, pair in sorted(pairs, key=lambda item: item[0])]
+    pairs += [{"after": one} for column, one in enumerate(after) if column not in partner.values()]
+    return sorted(pairs, key=lambda sets: next(iter(sets.values())).dp or 0.0)
 
 
 def relative_distance(one: float | None, other: float | None) -> float:

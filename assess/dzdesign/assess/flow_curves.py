@@ -10,9 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dzdesign.assess.assessment import MeasuredBranch, MeasuredCurve
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import worded
-from dzdesign.identify.constants import MPA
+from dzdesign.identify.constants import L_MIN, MPA
+from dzdesign.identify.knees.curve_thinning import TOLERANCE, decimals_of, evenly_spaced, fewest_points
 from dzdesign.identify.knees.gated_line import GATE, GatedLine, PreparedBranch, prepare_branch
 from dzdesign.identify.knees.linear_region import USEFUL_FLOW, find_straight_parts
 from dzdesign.identify.knees.noise import robust_sigma
@@ -244,3 +246,38 @@ def _hold_after_closing(ramp: Ramp, u_max: float) -> np.ndarray:
         return np.empty(0)
     hold = q[held]
     return hold[hold.size // 2 :] if hold.size >= HOLD_SAMPLES else np.empty(0)
+
+
+#: Most points of a line in assessment.json, and most samples beside it.
+MOST_POINTS, MOST_SAMPLES = 104, 24
+
+
+def measured_curve(curves: PressureCurves, u_max: float) -> MeasuredCurve:
+    """Return the curve of one set at one pressure drop, thinned to at most `MOST_POINTS` points a branch.
+
+    Full command `u_max` in V.
+    """
+    rising, falling = (
+        None if curve is None else _branch(curve, u_max, TOLERANCE * curves.y_max)
+        for curve in (curves.rising, curves.falling)
+    )
+    return MeasuredCurve(rising=rising, falling=falling, conditions=curves.conditions)
+
+
+def _branch(curve: FlowCurve, u_max: float, tolerance: float) -> MeasuredBranch:
+    u, q = curve.read.profile
+    at, flows = fewest_points(u, q, np.full(q.size, tolerance))
+    kept = evenly_spaced(curve.read.branch.u, MOST_SAMPLES)
+    decimals = decimals_of(curve.read.y_max / L_MIN)
+    # Of two points that round to one command the later one stands for both.
+    line = dict(zip(_rounded(100 * u[at] / u_max, 3), _rounded(flows / L_MIN, decimals), strict=True))
+    return MeasuredBranch(
+        command_percent=tuple(line),
+        q_L_min=tuple(line.values()),
+        sample_command_percent=_rounded(100 * curve.read.branch.u[kept] / u_max, 3),
+        sample_q_L_min=_rounded(curve.read.y[kept] / L_MIN, decimals),
+    )
+
+
+def _rounded(values: np.ndarray, decimals: int) -> tuple[float, ...]:
+    return tuple(round(value, decimals) + 0.0 for value in values.tolist())

@@ -1,6 +1,11 @@
-"""The quantities of a valve test, read from the curves of one set of recordings at one pressure drop."""
+"""The quantities of a valve test, read from the curves of one set of recordings at one pressure drop.
+
+At the end stand hysteresis, linearity and gain of a `Line`, a curve that is known by few points, of valve.json or of a
+simulated loop: nothing is known of its noise, so there are no errors.
+"""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -25,6 +30,10 @@ OF_MEDIAN, BINS = 1.25, 5
 NEAR = 3
 #: Fewest cells of a curve in the window of its best straight line.
 FEWEST_CELLS = 10
+#: Of a curve known by few points: points over the window of linearity, and over a branch for its straight part.
+POINTS = 81
+#: Flows between which its gain is taken, over the largest: where `identify` looks for the straight part.
+STRAIGHT = (0.12, 0.5)
 
 
 def read_quantities(
@@ -148,7 +157,7 @@ def _hysteresis(
     top = min(curve.read.y_max for curve in (rising, falling))
     # What a branch does not come down to has no command.
     lowest = max(CLEAR * max(curve.read.floor, float(curve.q[0])) for curve in (rising, falling))
-    levels = [share * top for share in WIDTH_LEVELS if share * top >= lowest]
+    levels = _levels(top, lowest)
     if len(levels) < FEWEST_LEVELS:
         return hidden(
             f"only {len(levels)} of the levels from {WIDTH_LEVELS[0]:.0%} to {WIDTH_LEVELS[-1]:.0%} of the largest "
@@ -163,6 +172,11 @@ def _hysteresis(
         se=math.hypot(found[widest][0][1], found[widest][1][1]) / u_max,
         where=f"at {levels[widest] / top:.0%} of the largest flow",
     )
+
+
+def _levels(top: float, lowest: float) -> list[float]:
+    """Return the flows at which the branches' distance is taken."""
+    return [share * top for share in WIDTH_LEVELS if share * top >= lowest]
 
 
 def _command_at(curve: FlowCurve, level: float) -> tuple[float, float]:
@@ -202,10 +216,7 @@ def _linearity(
     u = np.linspace(low, high, count)
     mean = np.mean([np.interp(u, curve.u, curve.q) for curve in curves.curves], axis=0)
     errors = np.array([np.interp(u, curve.u, curve.q_se) for curve in curves.curves])
-    # The ends stand for half a step each: counted in full they pull the line to themselves.
-    weights = np.ones(count)
-    weights[[0, -1]] = math.sqrt(0.5)  # of the departure, not of its square
-    departure = np.abs(mean - np.polyval(np.polyfit(u, mean, 1, w=weights), u))
+    departure = _departure(u, mean)
     widest = int(np.argmax(departure))
     error = float(np.sqrt(np.sum(errors[:, widest] ** 2))) / len(errors) / rated
     return observed(
@@ -214,6 +225,14 @@ def _linearity(
         note=_one_branch(curves, len(curves.curves)),
         where=f"at {u[widest] / u_max:.0%} of command",
     )
+
+
+def _departure(u: np.ndarray, mean: np.ndarray) -> np.ndarray:
+    """Return how far a curve lies off its best straight line, (N,)."""
+    # The ends stand for half a step each: counted in full they pull the line to themselves.
+    weights = np.ones(u.size)
+    weights[[0, -1]] = math.sqrt(0.5)  # of the departure, not of its square
+    return np.asarray(np.abs(mean - np.polyval(np.polyfit(u, mean, 1, w=weights), u)))
 
 
 def _one_branch(curves: PressureCurves, used: int) -> str:
@@ -258,3 +277,75 @@ def _flow_at_zero(curves: PressureCurves, units: RecordedUnits) -> Reading:
         return hidden(f"the meter shows nothing below {units.text(floor / L_MIN, '.3g L/min')}", at_most=floor)
     spread = float(kept.std()) * math.sqrt(min(curves.variance_inflation, kept.size) / kept.size)
     return observed(value, se=spread)
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One branch: flow (N,) in L/min over command (N,) as a share of full command, rising."""
+
+    u: np.ndarray
+    q: np.ndarray
+
+    def command_at(self, flow: float) -> float:
+        """Return the lowest command at which it passes a flow; NaN where it never does."""
+        reached = np.flatnonzero(self.q >= flow)
+        if not reached.size:
+            return float("nan")
+        at = int(reached[0])
+        return float(self.u[0] if at == 0 else np.interp(flow, self.q[at - 1 : at + 1], self.u[at - 1 : at + 1]))
+
+
+def hysteresis_of(rising: Line, falling: Line, floor: float = 0.0) -> float | None:
+    """Return the largest distance of the branches at equal flow, a share of full command; `floor` of the meter, L/min.
+
+    None where too few flows are common to both.
+
+    Examples
+    --------
+    >>> line = np.linspace(0.0, 1.0, 11)
+    >>> round(hysteresis_of(Line(line + 0.02, line), Line(line, line)), 6)
+    0.02
+    """
+    top = min(float(line.q.max()) for line in (rising, falling))
+    lowest = max(CLEAR * max(floor, float(line.q[0])) for line in (rising, falling))
+    levels = _levels(top, lowest)
+    if len(levels) < FEWEST_LEVELS:
+        return None
+    return max(abs(rising.command_at(level) - falling.command_at(level)) for level in levels)
+
+
+def linearity_of(lines: tuple[Line, ...], rated: float, window: tuple[float, float] = (0.1, 0.9)) -> float | None:
+    """Return the largest departure of the mean curve from its best straight line, over the flow `rated` (L/min).
+
+    None where a branch does not cover the window, shares of full command.
+
+    Examples
+    --------
+    >>> line = np.linspace(0.0, 1.0, 11)
+    >>> round(linearity_of((Line(line, 20 * line),), rated=20.0), 6)
+    0.0
+    """
+    low, high = window
+    if not lines or rated <= 0 or any(line.u[0] > low + 0.01 or line.u[-1] < high - 0.01 for line in lines):
+        return None
+    u = np.linspace(low, high, POINTS)
+    mean = np.mean([np.interp(u, line.u, line.q) for line in lines], axis=0)
+    return float(_departure(u, mean).max()) / rated
+
+
+def gain_of(lines: tuple[Line, ...]) -> float | None:
+    """Return the mean slope of the straight parts, L/min per full command; None where no branch has one.
+
+    Examples
+    --------
+    >>> line = np.linspace(0.0, 1.0, 11)
+    >>> round(gain_of((Line(line, 20 * line),)), 6)
+    20.0
+    """
+    slopes = []
+    for line in lines:
+        low, high = (line.command_at(share * float(line.q.max())) for share in STRAIGHT)
+        if high > low:
+            u = np.linspace(low, high, POINTS)
+            slopes.append(float(np.polyfit(u, np.interp(u, line.u, line.q), 1)[0]))
+    return float(np.mean(slopes)) if slopes else None

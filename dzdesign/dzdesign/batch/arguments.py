@@ -1,7 +1,7 @@
 """Arguments of `batch`."""
 
 from dataclasses import KW_ONLY, dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from dzdesign.core.option_readers import whole_number
 from dzdesign.core.options import AnyPath, Option, Text
@@ -12,12 +12,19 @@ from dzdesign.stages.identify import IdentifyChoices
 
 @dataclass(frozen=True)
 class BatchArguments(OutputChoices, DesignChoices, IdentifyChoices):
-    """Arguments of `batch`: beside its own, the options of `identify`, `design` and outputs for every valve."""
+    """Arguments of `batch`: beside its own, the options of `identify`, `design` and outputs for every valve.
+
+    Those are of the options file: the command line has what the class declares itself.
+    """
+
+    IN_FILE: ClassVar = (OutputChoices, DesignChoices, IdentifyChoices)
+    #: Options of `identify` that are of one valve: without them it would be another one.
+    ONE_VALVE: ClassVar = ("low_flow",)
 
     source: Annotated[AnyPath, Option("FOLDER")]
     """Folder with a subfolder of recordings for each valve, or a CSV file with a row for each valve. Its columns are
     name, files (patterns separated by semicolons), record.NAME and any option of identify or design that differs
-    between the valves."""
+    between the valves. Options for all valves are in the file of --config."""
     _: KW_ONLY
     output: Annotated[AnyPath, Option("DIR", short="-o")] = "batch"
     """Folder to write. An earlier run in it is continued."""
@@ -36,7 +43,7 @@ class BatchArguments(OutputChoices, DesignChoices, IdentifyChoices):
     plant."""
     outputs: Annotated[Text, Option("NAMES")] = None
     """Outputs for each valve in addition to its firmware, separated by commas: iec61131, fmu, matlab,
-    amplifier."""
+    amplifier. Their options are in the file of --config."""
     calibration: Annotated[Text, Option("FORM")] = None
     """Form of a valve's numbers (default: fixed). fixed: in a firmware for each valve. block: in a calibration block
     for one firmware of the lot; each block is tried on every input."""

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from threading import Lock
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from dzdesign.batch.outputs import ForOutputs, WantedOutput, make_output, may_end_otherwise, reason_of_outputs
 from dzdesign.core.artefact_files import TOOL, write_folder
@@ -86,15 +86,11 @@ class Task:
         self,
         status: Status,
         reason: str = "",
-        files: Mapping[str, bytes] | None = None,
         *,
         again: bool = False,
         outputs: tuple[ValveOutput, ...] = (),
     ) -> "Outcome":
-        """Return what came of it; `files` by their path in the valve's folder.
-
-        The next run tries it `again` where that may end otherwise.
-        """
+        """Return what came of it, without its files; the next run tries it `again` where that may end otherwise."""
         manifest = ValveManifest(
             tool=THIS_TOOL,
             made_from=tuple(SourceFile(source=name, sha256=sha256_of(content)) for name, content in self.recordings),
@@ -105,7 +101,7 @@ class Task:
             outputs=outputs,
             files={},
         )
-        return Outcome(manifest=manifest, files=files or {})
+        return Outcome(manifest=manifest)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,15 +117,6 @@ class Outcome:
         return self.manifest.name
 
 
-class Result(NamedTuple):
-    """What came of the stages; the next run tries it `again` where that may end otherwise."""
-
-    status: Status
-    reason: str = ""
-    outputs: tuple[ValveOutput, ...] = ()
-    again: bool = False
-
-
 def calibrate(task: Task) -> Outcome:
     """Identify, design, generate and, if asked for, verify one valve; a failure is an outcome, never an exception."""
     if task.refused:
@@ -137,17 +124,17 @@ def calibrate(task: Task) -> Outcome:
     # The batch says a line for each valve; a stage's own would not name its valve, and a worker knows no --quiet.
     with SOLVER_LOCK, reporting(quiet=True, verbose=False), scratch_folder() as folder:
         try:
-            result = _run(task, folder)
+            manifest = _run(task, folder).manifest
         except DzdesignError as error:
-            result = Result(FAILED, str(error))
+            manifest = task.outcome(FAILED, str(error)).manifest
         except Exception as error:  # a fault of ours must not stop the batch either
-            result = Result(FAILED, f"unexpected {type(error).__name__}: {error}", again=True)
+            manifest = task.outcome(FAILED, f"unexpected {type(error).__name__}: {error}", again=True).manifest
         out = folder / "out"
         paths = sorted(path for path in out.rglob("*") if path.is_file())  # none where nothing came to be written
         files = {path.relative_to(out).as_posix(): path.read_bytes() for path in paths}
-        outputs = tuple(replace(each, reason=_of_the_user(each.reason, folder)) for each in result.outputs)
-        reason = _of_the_user(result.reason, folder)
-        return task.outcome(result.status, reason, files, again=result.again, outputs=outputs)
+        outputs = tuple(replace(each, reason=_of_the_user(each.reason, folder)) for each in manifest.outputs)
+        reason = _of_the_user(manifest.reason, folder)
+        return Outcome(manifest=replace(manifest, reason=reason, outputs=outputs), files=files)
 
 
 def _of_the_user(reason: str, folder: Path) -> str:
@@ -157,7 +144,7 @@ def _of_the_user(reason: str, folder: Path) -> str:
     return reason
 
 
-def _run(task: Task, folder: Path) -> Result:
+def _run(task: Task, folder: Path) -> Outcome:
     """Run the stages into ``folder/out``."""
     from dzdesign.stages.design import DesignArguments, design
     from dzdesign.stages.identify import IdentifyArguments, identify
@@ -171,17 +158,15 @@ def _run(task: Task, folder: Path) -> Result:
     )
     status, reason = _firmware(task, folder, valve, compensator, recordings)
     if status != OK:
-        return Result(status, reason, tuple(_unmade(each, "the firmware does not hold") for each in task.outputs))
-    document = (out / compensator.FILE_NAME).read_bytes()
-    of = ForOutputs(
-        compensator=compensator, document=document, valve=valve, recordings=recordings, place=out, verify=task.verify
-    )
+        unmade = tuple(_unmade(each, "the firmware does not hold") for each in task.outputs)
+        return task.outcome(status, reason, outputs=unmade)
+    of = ForOutputs(compensator=compensator, valve=valve, recordings=recordings, place=out, verify=task.verify)
     outputs = tuple(make_output(each, of) for each in task.outputs)
     if outputs and task.verify:
         _report_with_outputs(out)
     again = any(map(may_end_otherwise, outputs))
     status = DOES_NOT_HOLD if any(each.verdict == DOES_NOT_HOLD for each in outputs) else FAILED if again else OK
-    return Result(status, reason_of_outputs(outputs), outputs, again)
+    return task.outcome(status, reason_of_outputs(outputs), again=again, outputs=outputs)
 
 
 def _report_with_outputs(out: Path) -> None:

@@ -9,17 +9,20 @@ from pathlib import Path
 
 from dzdesign.batch.arguments import BatchArguments
 from dzdesign.batch.calibration import Outcome, Task
-from dzdesign.batch.lot_firmware import firmware_left, foreign_block, needing_another, write_lot_firmware
 from dzdesign.batch.outputs import WantedOutput, wanted_outputs
 from dzdesign.batch.runners import run_local, run_on_cluster
 from dzdesign.batch.summary import (
     SETTING_NAME,
     anomalies_of,
+    firmware_left,
+    foreign_block,
     lot_outputs,
     lot_setting_of,
+    needing_another,
     setting_summary,
     summary_of,
     units_of_lot,
+    write_lot_firmware,
 )
 from dzdesign.batch.valve_folders import Results, ValveFolder, table_of_valves
 from dzdesign.batch.valves import Valve, valves_of
@@ -73,53 +76,48 @@ def calibrate_lot(args: BatchArguments) -> LotSummary:
 
 
 @contextlib.contextmanager
-def _locked(folder: Path) -> Iterator[None]:
-    """Hold a folder by a lock that goes with the process, however it ends; a BlockingIOError where another holds it.
-
-    Windows, some file systems of networks, and folders that can't be listed have no such lock.
-    """
-    try:
-        import fcntl
-
-        descriptor = os.open(folder, os.O_RDONLY)
-    except (ImportError, PermissionError):
-        yield
-        return
-    try:
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise
-        except OSError:
-            pass
-        yield
-    finally:
-        os.close(descriptor)
-
-
-@contextlib.contextmanager
 def _taken(output: Path) -> Iterator[None]:
     """Keep a second batch out of the folder, and say of a full disk what to do.
 
     A second batch would take up the first one's half, with other options perhaps. Another place for the output, which
     every command proposes where one is full, would leave behind what is done.
     """
-    with contextlib.ExitStack() as stack:
-        try:
-            stack.enter_context(_locked(output))
-        except BlockingIOError as error:
-            raise InputError(
-                f"another batch is writing into '{output}'; wait until it has ended, or choose another folder with -o"
-            ) from error
-        try:
-            yield
-        except InputError as error:
-            if not _is_full(error):
-                raise
-            raise InputError(
-                f"no space is left to write into '{output}'; make room and give the same command again: it takes up "
-                "the valves that are done"
-            ) from error
+    descriptor = _locked(output)
+    try:
+        yield
+    except InputError as error:
+        if not _is_full(error):
+            raise
+        raise InputError(
+            f"no space is left to write into '{output}'; make room and give the same command again: it takes up the "
+            "valves that are done"
+        ) from error
+    finally:
+        if descriptor is not None:
+            os.close(descriptor)
+
+
+def _locked(folder: Path) -> int | None:
+    """Lock a folder until the descriptor is closed, however the process ends.
+
+    Windows, some file systems of networks, and folders that can't be listed have no such lock: then it is None.
+    """
+    try:
+        import fcntl
+
+        descriptor = os.open(folder, os.O_RDONLY)
+    except (ImportError, PermissionError):
+        return None
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        os.close(descriptor)
+        raise InputError(
+            f"another batch is writing into '{folder}'; wait until it has ended, or choose another folder with -o"
+        ) from error
+    except OSError:
+        pass
+    return descriptor
 
 
 def _is_full(error: InputError) -> bool:
@@ -204,9 +202,7 @@ def _check_options(args: BatchArguments) -> None:
 
 def _plant(args: BatchArguments) -> tuple[str, bytes] | None:
     """Return name and content of the plant's file, which must be one."""
-    if args.plant is None:
-        return None
-    if not args.verify:  # of an output it is another setting
+    if args.plant is None or not args.verify:  # of an output it is another setting
         return None
     from dzdesign.verify.closed_loop.plant import read_plant
 

@@ -9,14 +9,7 @@ from dzdesign.batch.arguments import BatchArguments
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.errors import DzdesignError, InputError, nearest
 from dzdesign.core.options import flag_of
-from dzdesign.report.lot.summary import (
-    DOES_NOT_HOLD,
-    HOLDS,
-    NOT_MADE,
-    NOT_VERIFIED,
-    OutputVerdict,
-    ValveOutput,
-)
+from dzdesign.report.lot.summary import DOES_NOT_HOLD, HOLDS, NOT_MADE, NOT_VERIFIED, OutputVerdict, ValveOutput
 from dzdesign.stages.generate import chosen_of_outputs
 
 if TYPE_CHECKING:
@@ -41,7 +34,6 @@ class ForOutputs:
     """What the outputs of one valve are made and checked of; `place` is the folder of the valve."""
 
     compensator: "Compensator"
-    document: bytes
     valve: "ValveModel"
     recordings: Sequence[Path]
     place: Path

@@ -9,7 +9,6 @@ from concurrent.futures import CancelledError
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, nullcontext, suppress
 from itertools import count, islice
-from threading import Event, Thread
 from typing import TYPE_CHECKING, Any
 
 from dzdesign.batch.calibration import Outcome, Task, calibrate
@@ -29,8 +28,6 @@ AHEAD = 2
 CONNECT_S = 10
 #: Workers that a message names.
 MOST_NAMED = 10
-#: How often it is looked whether any worker is there: waiting for one looks like work.
-LOOK_S = 5.0
 #: Loggers of Dask that tell of a lost scheduler in pages of their own.
 TALKATIVE = ("distributed", "distributed.client")
 ENDED = "the process that calibrated it ended without a word (out of memory, or killed)"
@@ -99,8 +96,13 @@ def run_on_cluster(tasks: Iterable[Task], address: str, work: Work = calibrate) 
     lay on each of those workers: these valves are tried again one at a time, so that only the one that kills is blamed.
     The workers must be able to import `work`.
     """
-    with _scheduler_lost(address), _client(address) as client, _workers_missed(client, address):
+    with _scheduler_lost(address), _client(address) as client:
         _check_workers(client)
+        if not client.nthreads():
+            say(
+                f"no worker is connected to the Dask scheduler at '{address}': waiting for one, such as `dask worker "
+                f"{address} --nthreads 1`; if you stop this, what is done is kept"
+            )
         suspects = []
         for task, future in _ended(client, iter(tasks), work):
             if _killed(future):
@@ -151,32 +153,6 @@ def _check_workers(client: "Client") -> None:
             f"of the Dask workers {and_more(words, MOST_NAMED)}; install dzdesign {THIS_TOOL.version} on each of them, "
             "or end them"
         )
-
-
-@contextmanager
-def _workers_missed(client: "Client", address: str) -> Iterator[None]:
-    """Say, once each time, that no worker is there: the batch waits for one, be it for ever."""
-    over = Event()
-
-    def look() -> None:
-        alone = False
-        while not over.wait(LOOK_S):
-            try:
-                before, alone = alone, not client.nthreads()
-            except (OSError, RuntimeError, CancelledError, ValueError):
-                return  # the scheduler is gone, which is said elsewhere
-            if alone and not before:
-                say(
-                    f"no worker is connected to the Dask scheduler at '{address}': waiting for one, such as `dask "
-                    f"worker {address} --nthreads 1`; if you stop this, what is done is kept"
-                )
-
-    looking = Thread(target=look, daemon=True)
-    looking.start()
-    try:
-        yield
-    finally:
-        over.set()
 
 
 def _ended(client: "Client", source: Iterator[Task], work: Work) -> "Iterator[tuple[Task, Future]]":

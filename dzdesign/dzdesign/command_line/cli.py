@@ -10,6 +10,7 @@ import signal
 import sys
 
 from dzdesign.core.errors import DzdesignError, InternalError, RequirementError, clear_line
+from dzdesign.terminal.progress import lead_nowhere, reporting, say_on_stderr
 
 #: What the system says of an output that takes no more: full, beyond a quota, closed, a device that fails.
 UNPRINTABLE = (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC), errno.EBADF, errno.EIO, errno.EFBIG)
@@ -26,7 +27,7 @@ def main(argv: list[str] | None = None) -> int:
     if sys.stderr is None:
         sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 (as long as the process lives)
     if sys.stdout is None:
-        _tell("the standard output is closed, and results go there; leave it open")
+        say_on_stderr("the standard output is closed, and results go there; leave it open")
         return BAD_INPUT
     call = None
     try:
@@ -38,7 +39,6 @@ def main(argv: list[str] | None = None) -> int:
             return 0
         from dzdesign.command_line.invocation import parse
         from dzdesign.command_line.parser import command_module
-        from dzdesign.terminal.progress import reporting
 
         call = parse(argv)
         with reporting(quiet=call.quiet, verbose=call.verbose):
@@ -46,39 +46,32 @@ def main(argv: list[str] | None = None) -> int:
             sys.stdout.flush()  # what can't be printed is said here and not when Python ends
             return status
     except RequirementError as error:
-        _tell(f"does not hold: {clear_line(str(error))}")
+        say_on_stderr(f"does not hold: {clear_line(str(error))}")
         return DOES_NOT_HOLD
     except InternalError as error:
-        _tell(clear_line(str(error)))
+        say_on_stderr(clear_line(str(error)))
         return DOES_NOT_HOLD
     except DzdesignError as error:
         text = str(error)
         if call is not None and call.from_file:
-            from dzdesign.command_line.options_file import in_words_of_the_file
+            from dzdesign.command_line.invocation import in_words_of_the_file
 
             text = in_words_of_the_file(text, call.options_file, call.from_file)
-        _tell(clear_line(text))
+        say_on_stderr(clear_line(text))
         return BAD_INPUT
     except KeyboardInterrupt:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second one would end the clearing away behind this function
-        _tell(f"interrupted; nothing half-written was left{_what_was_written()}")
+        say_on_stderr(f"interrupted; nothing half-written was left{_what_was_written()}")
         return INTERRUPTED
     except BrokenPipeError:
-        _print_nothing_more()
+        lead_nowhere(sys.stdout)
         return PIPE_CLOSED
     except (MemoryError, OSError, ImportError) as error:
         if (reason := _reason_in_the_system(error)) is None:
             raise
-        _print_nothing_more()
-        _tell(f"{reason}{_what_was_written() or '; nothing was written'}")
+        lead_nowhere(sys.stdout)
+        say_on_stderr(f"{reason}{_what_was_written() or '; nothing was written'}")
         return BAD_INPUT
-
-
-def _tell(text: str) -> None:
-    """Say something on stderr; where that takes nothing, as on a full disk, the exit status alone says it."""
-    from dzdesign.terminal.progress import say_on_stderr
-
-    say_on_stderr(text)
 
 
 def _reason_in_the_system(error: Exception) -> str | None:
@@ -106,9 +99,3 @@ def _what_was_written() -> str:
 
     names = ", ".join(f"'{path}'" for path in written)
     return clear_line(f"; written before that: {names}") if names else ""
-
-
-def _print_nothing_more() -> None:
-    from dzdesign.terminal.progress import lead_nowhere
-
-    lead_nowhere(sys.stdout)

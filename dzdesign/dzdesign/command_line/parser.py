@@ -39,9 +39,8 @@ COMMANDS = {
     "design": Command(PIPELINE, "compute the certified law with exact coefficients, in compensator.json"),
     "codegen": Command(PIPELINE, "write C firmware, or Structured Text, FMUs, a MATLAB function, an amplifier's file"),
     "calibration": Command(PIPELINE, "write one valve's calibration block, or read one back"),
-    "export": Command(PIPELINE, "compute the fixed dead-zone parameters of an amplifier"),
     "verify": Command(PIPELINE, "check a firmware on every input and in closed loop, and write the evidence"),
-    "batch": Command(PIPELINE, "calibrate many valves, with one table and one report"),
+    "batch": Command(PIPELINE, "calibrate many valves with the options of one file, in one table and one report"),
     "assess": Command(EVIDENCE, "compare ramp tests without and with the compensator, with limits"),
     "report": Command(EVIDENCE, "write report.html from the artefacts in a folder"),
     "derive": Command(EVIDENCE, "derive the paper's equations again: premises, steps and a verdict for each"),
@@ -50,7 +49,7 @@ COMMANDS = {
     "simulate": Command(SETUP, "simulate ramp tests of a valve; the files are marked as simulated"),
     "monitor": Command(SETUP, "record the telemetry of a running firmware as a ramp file"),
     "load": Command(SETUP, "load a calibration block into an amplifier over its serial line"),
-    "doctor": Command(SETUP, "list compilers, simulators and packages, and how to install what is missing"),
+    "doctor": Command(SETUP, "list compilers and simulators, and how to install what is missing"),
 }
 #: Of the front page.
 EXAMPLES = (
@@ -152,8 +151,17 @@ def command_module(name: str) -> "ModuleType | Relay":
 
 
 def arguments_of_command(name: str) -> tuple[Argument, ...]:
-    """Return what a command takes."""
-    return arguments_of(command_module(name).Arguments)
+    """Return what a command takes on the command line; see `in_file`."""
+    declared = arguments_of(command_module(name).Arguments)
+    return tuple(argument for argument in declared if argument not in in_file(name))
+
+
+def in_file(name: str) -> tuple[Argument, ...]:
+    """Return what a command takes from the options file alone: what its arguments inherit from classes ``IN_FILE``."""
+    declaration = command_module(name).Arguments
+    inherited = {key for each in getattr(declaration, "IN_FILE", ()) for key in each.__dataclass_fields__}
+    inherited -= declaration.__annotations__.keys()
+    return tuple(argument for argument in arguments_of(declaration) if argument.name in inherited)
 
 
 def build_parser(only: str | None = None) -> tuple[Parser, dict[str, Parser]]:
@@ -245,6 +253,9 @@ def unknown_words(words: list[str], command: Parser) -> InputError:
     wrong = next((word for word in words if word.startswith("-")), words[0]).partition("=")[0]
     if not wrong.startswith("-"):
         return InputError(f"'{wrong}' is one word too many; see `{command.prog} --help`")
+    name = command.prog.rpartition(" ")[2]
+    if name in COMMANDS and any(wrong == each.flag for each in in_file(name)):
+        return InputError(f"`{command.prog}` takes {wrong} from the file of --config; write it there, for every valve")
     hint = nearest(wrong, command._option_string_actions)
     owners = [other for other in COMMANDS if any(wrong == each.flag for each in arguments_of_command(other))]
     if owners:

@@ -65,9 +65,7 @@ def _read(arguments: Arguments, json: bool) -> int:
     for name in OF_WRITING:
         if getattr(arguments, name) is not None:
             raise InputError(f"{flag_of(name)} is for writing a block, and --read only reads one; leave it out")
-    found = read_calibration(
-        ReadCalibrationArguments(arguments.read or "", arguments.compensator, format=arguments.format)
-    )
+    found = read_calibration(ReadCalibrationArguments(arguments.read or "", arguments.compensator))
     if json:
         print_json(_read_document(found))
     else:

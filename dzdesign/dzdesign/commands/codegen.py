@@ -1,4 +1,4 @@
-"""`dzdesign codegen COMPENSATOR.json`, or VALVE.json."""
+"""`dzdesign codegen COMPENSATOR.json`."""
 
 import os
 from dataclasses import KW_ONLY, dataclass, replace
@@ -12,7 +12,7 @@ from dzdesign.terminal.progress import say
 
 EXAMPLES = (
     "dzdesign codegen compensator.json -o firmware",
-    "dzdesign codegen valve.json --target host",
+    "dzdesign codegen compensator.json --target host",
     "dzdesign codegen compensator.json --target iec61131 --dialect twincat -o plc",
     "dzdesign codegen compensator.json --target matlab -o matlab",
     "dzdesign codegen compensator.json --target amplifier --device west -o amplifier",
@@ -25,7 +25,7 @@ class Arguments(GenerateArguments):
     """Arguments of the stage, and what prints the targets instead."""
 
     compensator: Annotated[AnyPath | None, Option("COMPENSATOR.json")] = None  # type: ignore[assignment]
-    """The compensator.json of the design, or a valve.json, which is first designed with the options below."""
+    """The compensator.json made by `dzdesign design`."""
     _: KW_ONLY
     list_targets: Annotated[bool, Option()] = False
     """Print name and description of every target, microcontrollers before other outputs."""
@@ -36,12 +36,13 @@ def run(arguments: Arguments, json: bool) -> int:
     from dzdesign.codegen.other_targets import folder_of
     from dzdesign.codegen.project import DEFAULT_TARGET, Firmware
     from dzdesign.design.costs import design_warnings
-    from dzdesign.terminal.tables import print_firmware, print_output
+    from dzdesign.terminal.output_tables import print_output
+    from dzdesign.terminal.tables import print_firmware
 
     if arguments.list_targets:
         return _list_targets(json)
     if arguments.compensator is None:
-        raise InputError("codegen needs a COMPENSATOR.json or a VALVE.json; see `dzdesign codegen --help`")
+        raise InputError("codegen needs a COMPENSATOR.json; see `dzdesign codegen --help`")
     folder = os.fspath(arguments.output or folder_of(arguments.target or DEFAULT_TARGET))
     made = generate(replace(arguments, output=folder))
     for line in design_warnings(made.compensator):

@@ -35,7 +35,7 @@ class Arguments:
 def run(arguments: Arguments, json: bool) -> int:
     """Run the pipeline on the bundled ramp tests and print the closing table."""
     from dzdesign.derivation.account.account import verify_statements
-    from dzdesign.terminal.verification_tables import print_demo
+    from dzdesign.terminal.evidence_tables import print_demo
 
     folder, example = Path(arguments.folder), example_folder()
     for part in ("firmware", "evidence", EXAMPLE):

@@ -1,4 +1,4 @@
-"""`dzdesign doctor`: which compilers, simulators and packages are there, what each is for, and how to get the rest."""
+"""`dzdesign doctor`: which compilers and simulators are there, what each is for, and how to get the rest."""
 
 import platform
 import re
@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from dzdesign.core.errors import DzdesignError
 from dzdesign.core.processes import find_program, run_program
+from dzdesign.core.version import __version__
 from dzdesign.terminal.page import Column, new_console, print_json, put_line, put_rows
 
 TINY = "#include <stdint.h>\nint32_t dz_tiny(int32_t a);\nint32_t dz_tiny(int32_t a) { return 3 * a; }\n"
@@ -63,18 +64,16 @@ class Arguments:
 def run(arguments: Arguments, json: bool) -> int:
     """Print what is there; 1 if no C compiler works, for then nothing can be verified."""
     programs = {tool.name: _found(tool) for tool in (*COMPILERS, *OPTIONAL)}
-    packages, (compiles, compiler) = _packages(), _compiles()
-    missing = [name for name, version in packages.items() if version is None and name != "ziglang"]
+    compiles, compiler = _compiles()
     one_is_there = any(programs[tool.name] for tool in COMPILERS)  # which is enough
     to_get = [tool for tool in (OPTIONAL if one_is_there else (*COMPILERS, *OPTIONAL)) if not programs[tool.name]]
-    about = {"dzdesign": _version("dzdesign"), "python": platform.python_version(), "system": platform.platform()}
-    holds = compiles and not missing
+    about = {"dzdesign": __version__, "python": platform.python_version(), "system": platform.platform()}
     if json:
         print_json({
-            **about, "compiles": compiles, "compiler": compiler, "programs": programs, "packages": packages,
-            "to_get": [tool._asdict() for tool in to_get], "holds": holds,
+            **about, "compiles": compiles, "compiler": compiler, "programs": programs,
+            "to_get": [tool._asdict() for tool in to_get],
         })  # fmt: skip
-        return 0 if holds else 1
+        return 0 if compiles else 1
     console = new_console()
     put_line(console, "dzdesign {dzdesign}, Python {python}, {system}".format_map(about))
     versions = {name: (found or {"version": "not found"})["version"] or "found" for name, found in programs.items()}
@@ -82,17 +81,13 @@ def run(arguments: Arguments, json: bool) -> int:
         "program": lambda tool: tool.name, "version": lambda tool: versions[tool.name], "for": lambda tool: tool.purpose
     }  # fmt: skip
     put_rows(console, "Programs", (*COMPILERS, *OPTIONAL), shown, words=(0, 1, 2))
-    listed = ", ".join(f"{name} {version or 'MISSING'}" for name, version in packages.items())
-    put_line(console, f"Python packages: {listed.replace('ziglang MISSING', 'ziglang (optional) not there')}")
     if to_get:
         system, source = SYSTEMS.get(sys.platform, ("Debian, Ubuntu", "debian"))
         columns = {"program": attrgetter("name"), system: attrgetter(source)}
         put_rows(console, "How to get the rest (--json: on every system)", to_get, columns, words=(0, 1))
-    if missing:
-        put_line(console, f"Missing packages: {sys.executable} -m pip install {' '.join(missing)}")
     works = f"A library was compiled, loaded and called with {compiler}: verify can run."
     put_line(console, works if compiles else f"NO C COMPILER WORKS: {compiler}")
-    return 0 if holds else 1
+    return 0 if compiles else 1
 
 
 def _found(tool: Tool) -> dict[str, str] | None:
@@ -108,27 +103,6 @@ def _found(tool: Tool) -> dict[str, str] | None:
         return {"path": path, "version": f"does not run: {error}"}
     number = re.search(r"\d+\.\d+(?:\.\d+)?\S*", done.stdout + done.stderr) if tool.ask != ("--help",) else None
     return {"path": path, "version": number.group().rstrip(",)") if number else ""}
-
-
-def _packages() -> dict[str, str | None]:
-    """Return the version of each package that dzdesign needs, and of ziglang; None: missing."""
-    from importlib.metadata import PackageNotFoundError, requires
-
-    try:
-        needed = [line for line in requires("dzdesign") or () if "extra ==" not in line]
-    except PackageNotFoundError:  # run from its sources
-        needed = []
-    names = sorted({re.split(r"[^\w.-]", line)[0] for line in needed}, key=str.lower)
-    return {name: _version(name) for name in (*names, "ziglang")}
-
-
-def _version(package: str) -> str | None:
-    from importlib.metadata import PackageNotFoundError, version
-
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return None
 
 
 def _compiles() -> tuple[bool, str]:

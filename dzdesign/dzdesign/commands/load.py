@@ -1,7 +1,6 @@
 """`dzdesign load`: a calibration block into a running drive over its serial line, or what the drive holds."""
 
 import contextlib
-import os
 import secrets
 from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
@@ -53,40 +52,18 @@ class Arguments:
     status 1."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Block:
-    """A block to load: where it is from, its octets, and what they say."""
-
-    source: str
-    octets: bytes
-    numbers: "CalibrationBlock"
-
-    @property
-    def origin(self) -> int:
-        return int.from_bytes(self.sha256[:4], "big")
-
-    @property
-    def sha256(self) -> bytes:
-        from dzdesign.codegen.calibration.packing import octets_of
-
-        return octets_of(self.numbers.compensator_sha256)
-
-    @property
-    def serial(self) -> str:
-        from dzdesign.codegen.calibration.packing import text_of
-
-        return text_of(self.numbers.serial)
-
-
 def run(arguments: Arguments, json: bool) -> int:
     """Load a block and read back what the drive holds; what the drive refuses is a `RequirementError`."""
+    from dzdesign.codegen.calibration.packing import read_block_file, text_of, unpack
     from dzdesign.codegen.loading.session import LoadSession
     from dzdesign.codegen.project import DEFAULT_TARGET, target_named
 
-    block = None if arguments.block is None else _block_of(Path(arguments.block))
-    if block is not None and arguments.serial not in (None, block.serial):
+    path = None if arguments.block is None else Path(arguments.block)
+    octets = b"" if path is None else read_block_file(path)[0]
+    block = None if path is None else unpack(octets, f"'{path}'")
+    if block is not None and arguments.serial not in (None, text_of(block.serial)):
         raise InputError(
-            f"{block.source} is the block of serial number {quoted(block.serial)}, and --serial says that the valve "
+            f"{path} is the block of serial number {quoted(text_of(block.serial))}, and --serial says that the valve "
             f"has {quoted(arguments.serial)}; nothing was sent: take the block of this valve"
         )
     link = target_named(DEFAULT_TARGET).link
@@ -95,11 +72,12 @@ def run(arguments: Arguments, json: bool) -> int:
         session = LoadSession(PortLine(port), secrets.randbelow(256))
         drive = before = _asked(session, arguments.port, baud)
         if block is not None:
-            drive = _load(session, block, before, arguments.port)
+            _check_fit(path, block, before)
+            drive = _load(session, path, octets, block, arguments.port)
     if json:
         print_json({**_document(drive, session), "serial_before": before.serial})
     else:
-        _print(block, drive, session)
+        _print(path, drive, session)
         if drive.serial != before.serial:
             say_results(f"Replaced: the block of serial number {one_line(before.serial) or 'none'}")
     if arguments.serial not in (None, drive.serial):
@@ -108,13 +86,6 @@ def run(arguments: Arguments, json: bool) -> int:
             f"{quoted(arguments.serial)} of --serial; load the block of this valve"
         )
     return 0
-
-
-def _block_of(path: Path) -> _Block:
-    from dzdesign.codegen.calibration.packing import read_block_file, unpack
-
-    octets = read_block_file(path)[0]
-    return _Block(source=os.fspath(path), octets=octets, numbers=unpack(octets, f"'{path}'"))
 
 
 def _asked(session: "LoadSession", port: str, baud: float) -> "DriveState":
@@ -129,19 +100,28 @@ def _asked(session: "LoadSession", port: str, baud: float) -> "DriveState":
         ) from error
 
 
-def _load(session: "LoadSession", block: _Block, drive: "DriveState", port: str) -> "DriveState":
-    """Load the block and return what the drive says then."""
+def _load(
+    session: "LoadSession", path: "Path | None", octets: bytes, block: "CalibrationBlock", port: str
+) -> "DriveState":
+    """Load the block of a file and return what the drive says then, which must be that it holds the block."""
+    from dzdesign.codegen.calibration.packing import octets_of
     from dzdesign.codegen.loading.session import NoReplyError, RefusedError
 
-    _check_fit(block, drive)
-    say(f"loading {block.source} into the amplifier on {port}")
-    requests = session.loading(block.octets, block.numbers.crc32, block.origin)
+    say(f"loading {path} into the amplifier on {port}")
+    origin = int.from_bytes(octets_of(block.compensator_sha256)[:4], "big")
+    requests = session.loading(octets, block.crc32, origin)
     try:
-        for _ in with_bar(requests, f"loading {block.source}", session.requests_of(block.octets)):
+        for _ in with_bar(requests, f"loading {path}", session.requests_of(octets)):
             pass
-        return _verified(session, block)
+        drive = session.query()
+        if (drive.crc, drive.origin) != (block.crc32, origin) or drive.block > 1:
+            raise RequirementError(
+                f"after loading the amplifier uses a block of CRC-32 {drive.crc:08x}, expected {block.crc32:08x} of "
+                f"{path}; load it again"
+            )
+        return drive
     except RefusedError as error:
-        raise RequirementError(f"the amplifier refuses {block.source}: {error}{_advice(error)}") from error
+        raise RequirementError(f"the amplifier refuses {path}: {error}{_advice(error)}") from error
     except NoReplyError as error:
         raise RequirementError(
             f"the amplifier on {port} stopped answering ({error}); it holds its old block, or all of the new one if "
@@ -153,39 +133,27 @@ def _load(session: "LoadSession", block: _Block, drive: "DriveState", port: str)
         raise
 
 
-def _check_fit(block: _Block, drive: "DriveState") -> None:
+def _check_fit(path: "Path | None", ours: "CalibrationBlock", drive: "DriveState") -> None:
     """Refuse what the drive's firmware is not compiled for, before anything is erased."""
     from dzdesign.codegen.calibration.layout import SHAPE_BITS
 
-    ours = block.numbers
     if (ours.layout, ours.length) != (drive.layout, drive.length):
         raise InputError(
-            f"{block.source} has layout {ours.layout} in {ours.length} words, the amplifier's firmware takes layout "
+            f"{path} has layout {ours.layout} in {ours.length} words, the amplifier's firmware takes layout "
             f"{drive.layout} in {drive.length}; firmware and dzdesign must be of one version"
         )
     if ours.shape != drive.shape:
         differs = [text for place, text in enumerate(SHAPE_BITS.values()) if (ours.shape ^ drive.shape) >> place & 1]
         raise InputError(
-            f"{block.source} is for another kind of drive than the firmware was generated for: they differ in "
+            f"{path} is for another kind of drive than the firmware was generated for: they differ in "
             f"'{', '.join(differs)}'; generate firmware and block from designs with the same wiring and outputs"
         )
     for name, what in COMPILED_FOR.items():
         if (block_has := getattr(ours, name)) != (drive_has := getattr(drive, name)):
             raise InputError(
-                f"{block.source} is for firmware with {what} {block_has}, the amplifier's has {drive_has}; design it "
+                f"{path} is for firmware with {what} {block_has}, the amplifier's has {drive_has}; design it "
                 "again for the amplifier's target with `dzdesign design --target`"
             )
-
-
-def _verified(session: "LoadSession", block: _Block) -> "DriveState":
-    """Ask the drive what it holds now, which must be the block."""
-    drive = session.query()
-    if (drive.crc, drive.origin) != (block.numbers.crc32, block.origin) or drive.block > 1:
-        raise RequirementError(
-            f"after loading the amplifier uses a block of CRC-32 {drive.crc:08x}, expected "
-            f"{block.numbers.crc32:08x} of {block.source}; load it again"
-        )
-    return drive
 
 
 def _advice(error: Any) -> str:
@@ -235,12 +203,12 @@ def _reason(reason: int) -> str | None:
     return reason_text(reason) if reason else None
 
 
-def _print(block: _Block | None, drive: "DriveState", session: "LoadSession") -> None:
+def _print(path: "Path | None", drive: "DriveState", session: "LoadSession") -> None:
     from dzdesign.codegen.loading.protocol import NO_BLOCK, VOLATILE
 
-    if block is not None:
+    if path is not None:
         again = f"; {session.repeats} requests were sent again" if session.repeats else ""
-        say_results(f"Loaded and read back: {block.source}{again}")
+        say_results(f"Loaded and read back: {path}{again}")
     say_results(f"Block in use: {_place(drive)}")
     if drive.block != NO_BLOCK:
         say_results(f"Serial number: {one_line(drive.serial) or 'none'}")

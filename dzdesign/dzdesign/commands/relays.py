@@ -7,6 +7,7 @@ import os
 import re
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
 from pathlib import Path
 from pkgutil import resolve_name
@@ -26,45 +27,37 @@ MOST_NAMES = 3
 PLAIN = re.compile(r"[\w ./*?:\[\],+@%=-]*")
 
 
+@dataclass
 class Relay:
     """A command: where its arguments and its stage are, lines for the help, and how the result is shown and judged.
 
     `show` is where the function is that prints the result, if it has more to print than the lines of `then`.
     """
 
-    def __init__(
-        self,
-        arguments: str,
-        stage: str,
-        examples: tuple[str, ...],
-        show: str,
-        then: Callable[[Any, Any], Iterable[str]],
-        *,
-        holds: Callable[[Any, Any], bool] = lambda result, arguments: True,
-        document: Callable[[Any, Any], Any] = lambda result, arguments: result,
-        one_valve: tuple[str, ...] = (),
-    ) -> None:
-        self._arguments, self._stage, self._show, self._then = arguments, stage, show, then
-        self._holds, self._document = holds, document
-        self.EXAMPLES = examples
-        #: Options of `identify` that the command does not take: without them a valve would be another one.
-        self.ONE_VALVE = one_valve
+    arguments: str
+    stage: str
+    EXAMPLES: tuple[str, ...]
+    show: str
+    then: Callable[[Any, Any], Iterable[str]]
+    _: KW_ONLY
+    holds: Callable[[Any, Any], bool] = lambda result, arguments: True
+    document: Callable[[Any, Any], Any] = lambda result, arguments: result
 
     @cached_property
     def Arguments(self) -> Any:
         """The class of the command's arguments."""
-        return resolve_name(f"dzdesign.{self._arguments}")
+        return resolve_name(f"dzdesign.{self.arguments}")
 
     def run(self, arguments: Any, json: bool) -> int:
         """Run the stage and print its result; 1 if that does not hold."""
-        result = resolve_name(f"dzdesign.{self._stage}")(arguments)
+        result = resolve_name(f"dzdesign.{self.stage}")(arguments)
         if json:
-            print_json(self._document(result, arguments))
+            print_json(self.document(result, arguments))
         else:
-            if self._show:
-                resolve_name(f"dzdesign.{self._show}")(result)
-            say_results(*self._then(result, arguments))
-        return 0 if self._holds(result, arguments) else 1
+            if self.show:
+                resolve_name(f"dzdesign.{self.show}")(result)
+            say_results(*self.then(result, arguments))
+        return 0 if self.holds(result, arguments) else 1
 
 
 def _written(result: Any, arguments: Any) -> tuple[str, ...]:
@@ -124,44 +117,6 @@ def _whole_lot(summary: Any, arguments: Any) -> bool:
     return True
 
 
-def _after_export(made: Any, arguments: Any) -> tuple[str, ...]:
-    return (f"Written: {arguments.output}" if arguments.output else "Nothing is written: give -o FILE",)
-
-
-def _document_of_export(made: Any, arguments: Any) -> dict[str, Any]:
-    """Return what was set and what it leaves; shares are of full command and full drive."""
-    from dzdesign.design.signals import SIDE_NAMES
-
-    setting = made.setting
-    sides = {
-        SIDE_NAMES[sign]: {
-            "safe_share": float(offset.share),
-            "lowest_at_MPa": float(offset.lowest_at_MPa),
-            "dp_MPa": [float(end) for end in offset.dp_MPa],
-            "points": [[float(value) for value in node] for node in setting.characteristics[sign].nodes],
-        }
-        for sign, offset in setting.offsets.items()
-    }
-    return {
-        "file": None if arguments.output is None else os.fspath(arguments.output),
-        "device": setting.device.name,
-        "title": setting.device.title,
-        "sources": list(setting.device.sources),
-        "parameters": dict(setting.parameters),
-        "unit": setting.device.unit,
-        "dp_MPa": None if setting.dp_MPa is None else float(setting.dp_MPa),
-        "sides": sides,
-        "dead_zones": [
-            {"side": row.side, "dp_MPa": row.dp_MPa, "fixed": dict(row.fixed), "law": dict(row.law),
-             "fixed_end_L_min": row.fixed_end_L_min, "law_end_L_min": row.law_end_L_min}
-            for row in made.dead_zones
-        ],
-        "notes": list(made.notes),
-        "checks": [{"id": each.id, "name": each.name, "holds": each.holds, "text": each.text} for each in made.checks],
-        "compensator_sha256": made.compensator_sha256,
-    }  # fmt: skip
-
-
 def _lines_of_proposal(proposal: Any, arguments: Any) -> Iterator[str]:
     yield from proposal.seen
     yield from (f"open: {line}" for line in proposal.opens)
@@ -211,16 +166,6 @@ RELAYS: Mapping[str, Relay] = {
         ("dzdesign design valve.json", "dzdesign design valve.json --hysteresis play --target cortex-m4"),
         "terminal.design_tables:print_design", _written,
     ),
-    "export": Relay(
-        "stages.export:ExportArguments", "stages.export:export",
-        (
-            "dzdesign export compensator.json --to west        # print the parameters and the dead zone that remains",
-            "dzdesign export compensator.json --to west -o pam199.txt",
-            "dzdesign export compensator.json --to cia408 -o valve.dcf --threshold '1 %'",
-            'dzdesign export compensator.json --to beckhoff -o table.st --table-dp "2 MPa"',
-        ),
-        "terminal.output_tables:print_export", _after_export, document=_document_of_export,
-    ),
     "verify": Relay(
         "stages.verify:VerifyArguments", "stages.verify:verify",
         (
@@ -229,16 +174,16 @@ RELAYS: Mapping[str, Relay] = {
             'dzdesign verify calibrated/lot/firmware --blocks "calibrated/valves/*/calibration.bin"',
             "dzdesign verify firmware --machine-code",
         ),
-        "terminal.verification_tables:print_result", _after_verify, holds=_holds,
+        "terminal.evidence_tables:print_result", _after_verify, holds=_holds,
         document=lambda made, arguments: made.evidence,
     ),
     "assess": Relay(
         "stages.assess:AssessArguments", "stages.assess:assess",
         (
             'dzdesign assess before/*.csv --after after/*.csv --limits "dead_zone_opening = 5 %"',
-            "dzdesign assess before/*.csv --after after/*.csv --config dzdesign.toml --plots plots",
+            "dzdesign assess before/*.csv --after after/*.csv --config dzdesign.toml",
         ),
-        "terminal.assessment_tables:print_assessment", _written, holds=_holds,
+        "terminal.evidence_tables:print_assessment", _written, holds=_holds,
     ),
     "simulate": Relay(
         "stages.simulate:SimulateArguments", "stages.simulate:simulate",
@@ -251,16 +196,15 @@ RELAYS: Mapping[str, Relay] = {
     "batch": Relay(
         "batch.arguments:BatchArguments", "stages.batch:batch",
         (
-            'dzdesign batch lot -o calibrated --jobs 4 --meter-lag "0.1 s"',
-            'dzdesign batch lot -o calibrated --meter-lag "0.1 s" --calibration block',
-            "dzdesign batch lot.csv -o calibrated --verify --dask tcp://10.0.0.5:8786",
+            "dzdesign batch lot -o calibrated --config dzdesign.toml --jobs 4",
+            "dzdesign batch lot -o calibrated --config dzdesign.toml --calibration block",
+            "dzdesign batch lot.csv -o calibrated --config dzdesign.toml --verify --dask tcp://10.0.0.5:8786",
         ),
         "batch.printing:print_quantiles", _lines_of_lot, holds=_whole_lot, document=_document_of_lot,
-        one_valve=("low_flow",),
     ),
     "reproduce": Relay(
         "stages.reproduce:ReproduceArguments", "stages.reproduce:reproduce",
-        ("dzdesign reproduce -o reproduction",), "terminal.reproduction_tables:print_reproduction",
+        ("dzdesign reproduce -o reproduction",), "terminal.evidence_tables:print_reproduction",
         lambda made, arguments: (f"Figures, parameters and artefacts: {arguments.output}",), holds=_holds,
     ),
 }  # fmt: skip

@@ -15,9 +15,8 @@ Number = Annotated[float, Meta(ge=-LARGEST, le=LARGEST)]
 Hash = Annotated[str, Meta(pattern="^[0-9a-f]{64}$", max_length=64)]
 #: Bare valve, or the whole product on it.
 Driver = Literal["valve", "product"]
-#: How a printed number stands to ours: it went into the fit; ours is a prediction; it is taken over as it is; or the
-#: paper has words and no digits, and nothing can agree.
-Kind = Literal["fitted", "predicted", "given", "in words"]
+#: How a printed number stands to ours: it went into the fit, or ours is a prediction.
+Kind = Literal["fitted", "predicted"]
 Range = tuple[Number, Number]
 
 
@@ -36,7 +35,7 @@ class PaperNumber:
     published: str
     """Number as printed."""
     kind: Kind
-    """Whether the number was used in a fit, is predicted, is taken from the paper, or has no digits."""
+    """Whether the number was used in a fit or is predicted."""
     by: Driver
     """Source of the value: the bare valve, or the whole product on it."""
     value: Number
@@ -45,29 +44,26 @@ class PaperNumber:
     """Value of dzdesign minus the printed one; null if no number is printed."""
     ideal_line: Number | None
     """Value of an ideal line from zero command to the largest flow, for a dead zone with compensator."""
-    allowed: Range | None
-    """Range that the printed digits and a measurement error allow; null if there are no digits."""
+    allowed: Range
+    """Range that the printed digits and a measurement error allow."""
     tolerance: str
-    """Components of the allowed range; empty if there are none."""
+    """Components of the allowed range."""
     reason: str
     """Reason for a value outside the range; empty if it agrees or the reason is unknown."""
     explained: Range | None
     """Range that the reason explains; null if there is no reason."""
     why: str
     """Background of the number, whether it agrees or not."""
-    agrees: bool | None = field(init=False)
-    """Whether the value lies in the allowed range; null if the number has no digits or is given."""
-    holds: bool | None = field(init=False)
-    """Whether the value agrees or misses by no more than its reason explains. It is also false if a given number or
-    a statement in words is contradicted. Null as for `agrees`."""
+    agrees: bool = field(init=False)
+    """Whether the value lies in the allowed range."""
+    holds: bool = field(init=False)
+    """Whether the value agrees or misses by no more than its reason explains."""
 
     def __post_init__(self) -> None:
-        within = self.allowed is None or self.allowed[0] <= self.value <= self.allowed[1]
-        compared = self.kind in ("fitted", "predicted")  # the others can't agree, but may contradict
+        agrees = self.allowed[0] <= self.value <= self.allowed[1]
         low, high = self.explained or (1.0, 0.0)
-        holds = within or (bool(self.reason) and low <= self.value <= high)
-        object.__setattr__(self, "agrees", within if compared else None)
-        object.__setattr__(self, "holds", holds if compared or not holds else None)
+        object.__setattr__(self, "agrees", agrees)
+        object.__setattr__(self, "holds", agrees or (bool(self.reason) and low <= self.value <= high))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,9 +117,7 @@ class Reproduction(Artefact):
     """Name and version of this schema."""
     paper: Annotated[str, Meta(pattern="^10[.]")]
     """DOI of the paper."""
-    holds: bool = field(
-        init=False
-    )
+    holds: bool = field(init=False)
     """Whether every number agrees or misses by no more than its reason explains."""
     assumptions: tuple[str, ...]
     """Assumptions that the paper does not state."""
@@ -133,4 +127,4 @@ class Reproduction(Artefact):
     """Valves in the order of the paper."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "holds", all(number.holds is not False for number in self.numbers))
+        object.__setattr__(self, "holds", all(number.holds for number in self.numbers))

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from dzdesign.derivation.account import published as paper
 from dzdesign.derivation.account.published import DP0_MPA, DP1_MPA, FIRST, SIMULATION, U_MAX_V
 from dzdesign.reproduce.recovered_valves import AtRest, half_digit, printed_at
-from dzdesign.reproduce.runs import DIRECT, PRODUCT, ValveRuns
+from dzdesign.reproduce.runs import ValveRuns
 from dzdesign.verify.closed_loop.loop import RECORD_S
 from dzdesign.verify.closed_loop.ramps import FLOW_SHARE
 
@@ -28,10 +28,7 @@ DISPLACEMENT, DISPLACEMENT_DEAD_ZONE = "largest displacement", "spool's dead zon
 METER_L_MIN = float(paper.METER_ACCURACY_L_MIN)
 DROP = f"taken {paper.DROP_ASSUMED}"
 LAW_AT_FULL_COMMAND = "Eq. (18) gives full command at full command, so the valve has the flow that it has without it"
-AMPLITUDE = "the level of an output pin, which no design sets: Figs. 12 and 13 are drawn with it"
 DUTY_OF_ONE = "Fig. 13 does not name its valve: of the two rows one at most can agree"
-OIL_FLOW = "the paper says that it rises with the oil's temperature; ours is the rise in per cent over the assumed oils"
-NO_SATURATION = "the paper sees none: ours is the command at which the flow comes within 0.1 % of its largest"
 
 
 class Oil(NamedTuple):
@@ -194,13 +191,6 @@ def no_saturation() -> Reason:
         f"times the flow at {DP1_MPA} MPa, the paper prints {printed:.2f} times; the fit follows the flows"
     )
     return Reason(text, AT_THE_END_V)
-
-
-def step(runs: ValveRuns) -> str:
-    """Give the times."""
-    without, product = (runs.rise_ms(drive) for drive in (DIRECT, PRODUCT))
-    times = f"without {without:.1f} ms, the product {product:.1f} ms"
-    return f"the text gives no time and no parameters of the motion; those of the default plant: {times}"
 
 
 def temperature(runs: ValveRuns) -> Reason:

@@ -1,4 +1,4 @@
-"""Figures 2, 3, 6 to 8, 12, 13, 16 to 19 and 23 of the paper, redrawn from the recovered valves; marks: its numbers."""
+"""Figures 6, 7, 16 to 19 and 23 of the paper, redrawn from the recovered valves; marks: its numbers."""
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
@@ -11,9 +11,8 @@ from dzdesign.derivation.law import law
 from dzdesign.identify.plots.frame import finish, new_figure, saved
 from dzdesign.identify.plots.style import plot_style
 from dzdesign.reproduce.recovered_valves import AtRest, printed_at
-from dzdesign.reproduce.runs import DIRECT, PRESSURES_MPA, PRODUCT, STEP_AT_S, WITHOUT_BETA, ValveRuns
+from dzdesign.reproduce.runs import DIRECT, PRESSURES_MPA, PRODUCT, WITHOUT_BETA, ValveRuns
 from dzdesign.verify.closed_loop.loop import LoopRun
-from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,9 +30,6 @@ LAW: Line = (0, (5, 2))
 #: Records between two points of a line: a tenth of a second of a ramp of 100 s.
 EVERY = 10
 MARKS = "marks: the printed numbers, in the colours of their pressure drops"
-#: Command of Fig. 3's example, V.
-EXAMPLE_V = 4.0
-PERIODS_DRAWN = 4
 
 
 def figure_files(valves: Sequence[ValveRuns]) -> dict[str, bytes]:
@@ -46,13 +42,8 @@ def figures(valves: Sequence[ValveRuns]) -> Iterator[tuple[str, "Figure"]]:
     """Yield each figure with its number in the paper, two digits."""
     simulated, first, second = valves
     static = "static flow without and with compensator"
-    yield "02", _over_pressure(simulated)
-    yield "03", _construction(simulated)
     yield "06", _at_rest(simulated)
     yield "07", _over_command(7, "static characteristics (simulated valve)", simulated, _static, _without_beta)
-    yield "08", _step(simulated)
-    yield "12", pulse(12, (first,), paper.DUTY_WITHOUT_PERCENT)
-    yield "13", pulse(13, (first, second), paper.DUTY_WITH_PERCENT)
     for number, drive, mark, title in (
         (16, DIRECT, _mark_without, "dead zone over pressure drop, without compensator"),
         (17, PRODUCT, _mark_with, "simulation and test, with compensator"),
@@ -178,52 +169,6 @@ def _saturation(axes: "Axes", runs: ValveRuns) -> None:
     axes.axvspan(low, high, color=GREY, alpha=0.25, lw=0, label=f"printed: flat from {low:g}-{high:g} V on")
 
 
-def _over_pressure(runs: ValveRuns) -> "Figure":
-    """Fig. 2: flow over the commands of both signs at several pressure drops; the valve is taken as symmetric."""
-    from matplotlib import colormaps
-
-    title, more = "dead zone in the flow curves", "simulated valve at rest; negative side: its mirror image"
-    figure, (axes,) = _new(2, title, more)
-    pressures = np.arange(DP0_MPA, DP1_MPA + 1)
-    for index, dp_MPa in enumerate(pressures):
-        rest = AtRest(runs.valve.plant, float(dp_MPa))
-        opens = rest.opens_V
-        u = np.array([-U_MAX_V, -opens, opens, U_MAX_V])
-        flow = rest.flow_per_volt * np.sign(u) * (np.abs(u) - opens)
-        axes.plot(u, flow, color=colormaps["viridis"](0.8 * index / (pressures.size - 1)), lw=1.8,
-                  ls=("-", "--", "-.", ":", (0, (6, 1, 1, 1, 1, 1)))[index], label=f"{dp_MPa} MPa")  # fmt: skip
-    axes.set(xlim=(-U_MAX_V, U_MAX_V))
-    return finish(figure, 1)
-
-
-def _construction(runs: ValveRuns) -> "Figure":
-    """Fig. 3: how the compensation signal u_0 follows from the target line, at the reference."""
-    rest = AtRest(runs.valve.plant, float(DP0_MPA))
-    opens, slope = rest.opens_V, rest.flow_per_volt
-    largest = slope * (U_MAX_V - opens)
-    flow = largest * EXAMPLE_V / U_MAX_V  # Eq. (9)
-    kappa = 1 - opens / U_MAX_V  # k x_max over u_max
-    driven = law("paper").evaluate_gain(1.0, kappa) * EXAMPLE_V + law("paper").evaluate_offset(1.0, opens)
-    title = "static flow at the reference point, simulated valve"
-    figure, (axes,) = _new(3, title, f"{DP0_MPA} MPa, valve at rest")
-    axes.plot([0, opens, U_MAX_V], [0, 0, largest], WITHOUT, color=BLUE, lw=2.2, label="without compensator")
-    axes.plot([0, U_MAX_V], [0, largest], WITH, color=BLUE, lw=2.2, label="with compensator: target line")
-    for command in (EXAMPLE_V, driven):
-        axes.plot([command] * 2, [0, flow], color=GREY, lw=1, ls="--")
-    low = -0.09 * largest
-    for start, end, height, text in (
-        (EXAMPLE_V, driven, flow, "u_0, Eq. (13)"),
-        (0, EXAMPLE_V, low, "u_i"),
-        (opens, driven, low, "u_i' = k x"),
-        (0, opens, 2.2 * low, "u_min0"),
-    ):
-        axes.annotate("", (end, height), (start, height), arrowprops={"arrowstyle": "<->", "color": BLACK})
-        axes.text((start + end) / 2, height - 0.02 * largest, text, ha="center", va="top")
-    _mark(axes, opens, 0, DP0_MPA, "^", "dead zone")
-    axes.set(xlabel="command (V)", ylim=(3.2 * low, 1.05 * largest))
-    return finish(figure, 1)
-
-
 def _at_rest(runs: ValveRuns) -> "Figure":
     """Fig. 6: displacement and flow over the command."""
     figure, (displacement, flow) = _new(
@@ -242,49 +187,3 @@ def _at_rest(runs: ValveRuns) -> "Figure":
         _mark_without(flow, runs, dp_MPa)
     displacement.set_ylabel("displacement x_e (mm)")
     return _done(figure, 2)
-
-
-def _step(runs: ValveRuns) -> "Figure":
-    """Fig. 8: the step to full command."""
-    figure, (axes,) = _new(
-        8, f"step of the command from 0 to {U_MAX_V} V (simulated valve, {DP0_MPA} MPa)",
-        "one point a period of the PWM; dynamics of the default plant, none are printed",
-    )  # fmt: skip
-    for drive, name, line, color in (
-        (DIRECT, "without compensator", WITHOUT, BLACK), (PRODUCT, "the product's C", WITH, BLUE)
-    ):  # fmt: skip
-        run = runs.steps[drive]
-        axes.plot(1e3 * (run.time - STEP_AT_S), run.q_L_min, ls=line, color=color, lw=2, label=name)
-    axes.set(xlabel="time after the step (ms)", xlim=(-5, 40))
-    return _done(figure, 1)
-
-
-def pulse(number: int, valves: Sequence[ValveRuns], printed: str) -> "Figure":
-    """Figs. 12 and 13: the pulse at 2 V without and with compensator; Fig. 13 does not say of which valve."""
-    without = printed == paper.DUTY_WITHOUT_PERCENT
-    figure, every = _new(
-        number, f"PWM signal with{'out' if without else ''} compensator, command of {paper.DUTY_COMMAND_V} V",
-        f"dashed: the printed duty cycle, {printed} %; amplitude as printed, {paper.PWM_AMPLITUDE_V} V",
-        headings=[runs.valve.published.name for runs in valves],
-    )  # fmt: skip
-    command = np.array([paper.DUTY_COMMAND_V / U_MAX_V])
-    for axes, runs in zip(every, valves, strict=True):
-        if without:
-            _draw_pulse(axes, runs.direct_duty_percent, WITH, BLUE, "command as duty cycle")
-        else:
-            name, (law_duty,) = runs.valve.published.name, 100 * paper_drive(runs.valve.published, command, DP0_MPA)
-            _draw_pulse(axes, law_duty, WITH, BLUE, f"{name}, the paper's law")
-            _draw_pulse(axes, runs.duty_percent, WITH, ORANGE, f"{name}, the product's C")
-        _draw_pulse(axes, float(printed), LAW, BLACK, "printed duty cycle")
-        axes.set(xlabel="time (ms)", ylabel="PWM signal u_O (V)", xlim=(0, 1e3 * PERIODS_DRAWN * PWM_PERIOD_S))
-    return _done(figure, 2)
-
-
-def _draw_pulse(axes: "Axes", duty_percent: float, line: Line, color: str, label: str) -> None:
-    """Draw a pulse that begins each period of the PWM high."""
-    high, period_ms = float(paper.PWM_AMPLITUDE_V), 1e3 * PWM_PERIOD_S
-    starts = np.arange(PERIODS_DRAWN) * period_ms
-    ends = starts + period_ms * duty_percent / 100
-    time = np.stack([starts, starts, ends, ends, starts + period_ms])
-    level = np.tile([[0.0], [high], [high], [0.0], [0.0]], PERIODS_DRAWN)
-    axes.plot(time.T.ravel(), level.T.ravel(), ls=line, color=color, lw=1.8, label=f"{label}: {duty_percent:.1f} %")

@@ -1,20 +1,15 @@
 """`assess`: recordings without and with the compensator -> Assessment."""
 
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from dzdesign.core.artefact_files import check_file_may_be_written, write_file
 from dzdesign.core.errors import InputError
 from dzdesign.core.option_readers import percent_range, quantity
 from dzdesign.core.options import FIT, RECORDINGS, AnyPath, Option, Paths, Table, Text, read_options
 from dzdesign.core.units import parse_quantity
-from dzdesign.stages.recordings import (
-    RampArguments,
-    check_places,
-    meter_choices,
-    read_recordings,
-    refuse_copies,
-    write_results,
-)
+from dzdesign.stages.recordings import RampArguments, meter_choices, read_recordings, refuse_copies
 from dzdesign.terminal.progress import say, stage_progress
 
 if TYPE_CHECKING:
@@ -54,8 +49,6 @@ class AssessArguments(RampArguments):
     """Columns of the recordings with the compensator, with its input as u (default: as --columns or [columns])."""
     after_u_max: Annotated[Text, Option("U", RECORDINGS, example="10 V", read=quantity("voltage"))] = None
     """Full command of the recordings with the compensator (default: as --u-max)."""
-    plots: Annotated[AnyPath | None, Option("DIR")] = None
-    """Folder for plots of flow against command, in SVG."""
 
 
 def assess(arguments: AssessArguments) -> "Assessment":
@@ -71,21 +64,21 @@ def assess(arguments: AssessArguments) -> "Assessment":
     InputError
         If a file or an option can't be read. An exceeded limit is not an error: see ``holds``.
     """
-    from dzdesign.assess.assessing import assess_curves
+    from dzdesign.assess.assessing import assess as assess_recordings
     from dzdesign.assess.assessment import Assessment
-    from dzdesign.assess.curve_pairs import compare_curves
-    from dzdesign.assess.plots import plot_files
+    from dzdesign.core.artefact_types import schema_of, to_json_bytes
 
     options = assess_options(arguments)
-    check_places(Assessment, arguments.output, arguments.plots)
+    if arguments.output is not None:
+        check_file_may_be_written(Path(arguments.output), schema_of(Assessment))
     before = _read_set("before", arguments.before, arguments.columns, arguments, options.of_set("before").u_max)
     columns = arguments.after_columns or arguments.columns
     after = _read_set("after", arguments.after, columns, arguments, options.of_set("after").u_max)
     refuse_copies([*before, *after])
     with stage_progress(f"comparing {len(before)} recordings before with {len(after)} after"):
-        comparison = compare_curves(before, after, options)
-    found = assess_curves(comparison)
-    write_results(found, arguments.output, arguments.plots, lambda: plot_files(comparison, found))
+        found = assess_recordings(before, after, options)
+    if arguments.output is not None:
+        write_file(Path(arguments.output), to_json_bytes(found), found.schema)
     return found
 
 
@@ -95,10 +88,7 @@ def _read_set(name: str, patterns: Paths, columns: Table, arguments: AssessArgum
     if inherited:
         say("recordings after: columns as those before, by --columns or [columns]; --after-columns says others")
     try:
-        return read_recordings(
-            patterns, u_max=u_max, columns=columns, dp=arguments.dp, sample_rate=arguments.sample_rate,
-            skip_rows=arguments.skip_rows, missing=arguments.missing, what=f"reading recordings {name}",
-        )  # fmt: skip
+        return read_recordings(patterns, replace(arguments, columns=columns), u_max, f"reading recordings {name}")
     except InputError as error:
         if name == "before" or "--columns" not in str(error):
             raise
@@ -112,8 +102,8 @@ def _read_set(name: str, patterns: Paths, columns: Table, arguments: AssessArgum
 
 def assess_options(arguments: AssessArguments) -> "AssessOptions":
     """Return the options of `assess` in SI units."""
-    from dzdesign.assess.limits import parse_limits
     from dzdesign.assess.options import AssessOptions
+    from dzdesign.assess.quantities import parse_limits
     from dzdesign.identify.options import IdentifyOptions
 
     reading = IdentifyOptions(**meter_choices(arguments, ["u_max", "meter_floor", "meter_lag", "knee_window"]))

@@ -27,8 +27,6 @@ class CalibrationArguments:
     _: KW_ONLY
     output: Annotated[AnyPath | None, Option("FILE", short="-o")] = None
     """File to write. Its ending selects the format: .hex Intel HEX, .bin raw octets."""
-    format: Annotated[Text, Option("NAME")] = None
-    """Format of a file with another ending: hex or bin (default: by the file's ending)."""
     target: Annotated[Text, Option("NAME")] = None
     """Microcontroller whose addresses the file states (default: that of the design)."""
     address: Annotated[Text, Option("N", example="0x330000")] = None
@@ -48,9 +46,6 @@ class ReadCalibrationArguments:
     """File written by `calibration`."""
     compensator: Annotated["Compensator | AnyPath | None", Option("COMPENSATOR.json")] = None
     """The compensator.json to compare the block with, or a firmware folder that holds one."""
-    _: KW_ONLY
-    format: Annotated[Text, Option("NAME")] = None
-    """Format of a file with another ending: hex or bin (default: by the file's ending)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,7 +92,7 @@ def calibration(arguments: CalibrationArguments) -> CalibrationImage:
     from dzdesign.codegen.calibration.packing import OCTETS, image_of, pack, unpack
 
     output = None if arguments.output is None else Path(arguments.output)
-    form = _format_of(output, arguments.format)
+    form = _format_of(output)
     if output is not None:
         _check_output(output, form)
     if arguments.address is not None and form == "bin":
@@ -141,7 +136,7 @@ def read_calibration(arguments: ReadCalibrationArguments) -> ReadCalibration:
     from dzdesign.core.recorded_units import AS_COMPUTED
 
     path = Path(arguments.file)
-    octets, place = read_block_file(path, _known_format(arguments.format))
+    octets, place = read_block_file(path)
     sectors = {target.name: target.block_place for target in targets() if target.sector}
     block, placed = unpack(octets, f"'{path}'"), place.in_words(sectors) if place else ""
     reading = reading_of(block, f"'{path}'")
@@ -161,32 +156,15 @@ def read_calibration(arguments: ReadCalibrationArguments) -> ReadCalibration:
     )
 
 
-def _known_format(name: str | None) -> str | None:
+def _format_of(output: Path | None) -> str:
+    """Return the format that the ending of a file says; octets where there is no file."""
     from dzdesign.codegen.calibration.packing import FORMATS as KNOWN
 
-    if name is not None and name not in KNOWN:
-        raise InputError(f"--format is {quoted(name)}{nearest(name, KNOWN)}, expected {' or '.join(KNOWN)}")
-    return name
-
-
-def _format_of(output: Path | None, given: str | None) -> str:
-    """Return the format that is asked for; a file whose ending says another could not be read back."""
-    from dzdesign.codegen.calibration.packing import FORMATS as KNOWN
-
-    ending = output.suffix.lower().removeprefix(".") if output is not None else ""
-    if _known_format(given) is None:
-        if output is None:
-            return "bin"
-        if ending not in KNOWN:
-            what = f"ends with '{output.suffix}'{nearest(ending, KNOWN)}" if ending else "has no ending"
-            raise InputError(
-                f"'{output}' {what}, expected {' or '.join(f'.{name}' for name in KNOWN)}; choose another -o, or say "
-                "--format"
-            )
-        return ending
-    if ending in KNOWN and ending != given:
-        raise InputError(f"'{output}' ends with '.{ending}', but --format is {given}; leave one of them out")
-    return str(given)
+    ending = output.suffix.lower().removeprefix(".") if output is not None else "bin"
+    if ending not in KNOWN:
+        what = f"ends with '{output.suffix}'{nearest(ending, KNOWN)}" if ending and output else "has no ending"
+        raise InputError(f"'{output}' {what}, expected {' or '.join(f'.{name}' for name in KNOWN)}; choose another -o")
+    return ending
 
 
 def _check_output(output: Path, form: str) -> None:

@@ -1,17 +1,13 @@
 """`codegen`, in Python `generate`: Compensator + target -> Firmware."""
 
-import os
 from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from dzdesign.core.artefact_files import check_folder_may_be_written
-from dzdesign.core.documents import parse_document, read_bytes
-from dzdesign.core.errors import InputError, quoted
 from dzdesign.core.option_readers import percent, quantity, whole_number
-from dzdesign.core.options import OUTPUTS, AnyPath, Option, Text, flag_of, read_options
-from dzdesign.design.design_choices import DEFAULTS, DesignChoices
-from dzdesign.stages.design import design_options
+from dzdesign.core.options import OUTPUTS, AnyPath, Option, Text, read_options
+from dzdesign.stages.design import given_compensator, refuse_underived
 
 if TYPE_CHECKING:
     from dzdesign.codegen.other_targets import Output
@@ -40,17 +36,16 @@ class OutputChoices:
 
 
 @dataclass(frozen=True)
-class GenerateArguments(OutputChoices, DesignChoices):
+class GenerateArguments(OutputChoices):
     """Arguments of `codegen`, in Python `generate`."""
 
     compensator: Annotated["Compensator | AnyPath", Option("COMPENSATOR.json")]
-    """The compensator.json of the design, or a valve.json, which is first designed with the options of `design`."""
+    """The compensator.json made by `dzdesign design`."""
     _: KW_ONLY
     output: Annotated[AnyPath | None, Option("DIR", short="-o")] = None
     """Folder to write (default of the command: firmware, or plc, fmu, matlab or amplifier for such an output)."""
     target: Annotated[Text, Option("NAME")] = None
-    """Microcontroller, or another output: iec61131, fmu, matlab, amplifier (default: the microcontroller of the design,
-    and f28335 for a valve.json)."""
+    """Microcontroller, or another output: iec61131, fmu, matlab, amplifier (default: the design's microcontroller)."""
     calibration: Annotated[Text, Option("FORM")] = None
     """Form of the valve's numbers (default: fixed). fixed: constants in the core. block: a block of data that the core
     receives."""
@@ -83,51 +78,42 @@ def generate(arguments: GenerateArguments) -> "Firmware | Output":
     >>> "core/dz_comp.c" in firmware.files                             # doctest: +SKIP
     True
     """
-    from dzdesign.codegen.other_targets import OTHER_TARGETS, check_target_name
+    from dzdesign.codegen.other_targets import (
+        OF_FIRMWARE,
+        OTHER_TARGETS,
+        check_target_name,
+        generate_output,
+        settings_of,
+    )
     from dzdesign.codegen.project import DEFAULT_TARGET
+    from dzdesign.codegen.project import generate as generate_project
+    from dzdesign.codegen.writing import write_generated
     from dzdesign.core.artefact_types import schema_of
-    from dzdesign.design.firmware_manifest import FirmwareManifest, OutputManifest
+    from dzdesign.design.firmware_manifest import FirmwareManifest, OutputManifest, form_named
+    from dzdesign.design.redesign import refuse_without_options
 
     target = arguments.target or DEFAULT_TARGET
     check_target_name(target)
-    kind = OutputManifest if target in OTHER_TARGETS else FirmwareManifest
-    if arguments.output is not None:
-        check_folder_may_be_written(Path(arguments.output), schema_of(kind))
-    return _other_output(arguments, target) if target in OTHER_TARGETS else _firmware(arguments, target)
-
-
-def _firmware(arguments: GenerateArguments, target: str) -> "Firmware":
-    """Generate the C project, and write it where that is asked for."""
-    from dzdesign.codegen.other_targets import settings_of
-    from dzdesign.codegen.project import generate as generate_project
-    from dzdesign.codegen.writing import write_generated
-    from dzdesign.design.firmware_manifest import form_named
-
-    form = form_named(arguments.calibration)
-    settings_of(target, chosen_of_outputs(arguments))
-    vectors: int = read_options(arguments, ["vectors"])["vectors"]
-    made, designed = _compensator(arguments, target)
-    firmware = generate_project(made, target if designed else arguments.target, form, vectors)
-    if arguments.output is None:
-        return firmware
-    return write_generated(firmware, Path(arguments.output), over_another=arguments.replace)
-
-
-def _other_output(arguments: GenerateArguments, target: str) -> "Output":
-    """Generate an output other than a C firmware, and write it where that is asked for."""
-    from dzdesign.codegen.other_targets import OF_FIRMWARE, generate_output, settings_of
-    from dzdesign.codegen.project import DEFAULT_TARGET
-    from dzdesign.codegen.writing import write_generated
-
-    given = chosen_of_outputs(arguments)
-    of_firmware = {name: getattr(arguments, name) for name in OF_FIRMWARE}
-    given |= {name: str(value) for name, value in of_firmware.items() if value not in (None, 0, "0")}
+    is_other, place = target in OTHER_TARGETS, None if arguments.output is None else Path(arguments.output)
+    if place is not None:
+        check_folder_may_be_written(place, schema_of(OutputManifest if is_other else FirmwareManifest))
+    given, form = chosen_of_outputs(arguments), form_named(arguments.calibration)
+    if is_other:
+        of_firmware = {name: getattr(arguments, name) for name in OF_FIRMWARE}
+        given |= {name: str(value) for name, value in of_firmware.items() if value not in (None, 0, "0")}
     settings = settings_of(target, given)
-    made, _ = _compensator(arguments, DEFAULT_TARGET)
-    output = generate_output(made, target, settings)
-    if arguments.output is None:
-        return output
-    return write_generated(output, Path(arguments.output), over_another=arguments.replace)
+    vectors: int = read_options(arguments, ["vectors"])["vectors"]
+    compensator, _, source = given_compensator(arguments.compensator)
+    of_file = compensator is not arguments.compensator
+    if target == "amplifier":  # whose parameters go to a device as they are printed
+        refuse_underived(compensator, source, of_file=of_file)
+    elif of_file:
+        refuse_without_options(compensator, source.strip("'"))
+    if is_other:
+        output = generate_output(compensator, target, settings)
+        return output if place is None else write_generated(output, place, over_another=arguments.replace)
+    firmware = generate_project(compensator, arguments.target, form, vectors)
+    return firmware if place is None else write_generated(firmware, place, over_another=arguments.replace)
 
 
 def chosen_of_outputs(arguments: OutputChoices) -> "dict[str, str | None]":
@@ -149,44 +135,3 @@ def _plant_text(path: Path) -> str:
     from dzdesign.verify.closed_loop.plant import read_plant
 
     return json.dumps({name: float(value) for name, value in asdict(read_plant(path, say)).items()})
-
-
-def _compensator(arguments: GenerateArguments, target: str) -> "tuple[Compensator, bool]":
-    """Return the compensator, and whether it was designed here."""
-    from dzdesign.core.artefact_reading import read_artefact
-    from dzdesign.design.compensator import SCHEMA as COMPENSATOR_SCHEMA
-    from dzdesign.design.compensator import Compensator
-    from dzdesign.design.designing import design as design_valve
-    from dzdesign.design.redesign import refuse_without_options
-    from dzdesign.identify.valve.model import SCHEMA as VALVE_SCHEMA
-    from dzdesign.identify.valve.model import ValveModel
-
-    given = arguments.compensator
-    if isinstance(given, Compensator):
-        _refuse_other_choices(given, "the compensator", arguments)
-        return given, False
-    source, content = os.fspath(given), read_bytes(Path(given), "compensator file")
-    document = parse_document(content, source, (COMPENSATOR_SCHEMA, VALVE_SCHEMA))
-    if document["schema"] == VALVE_SCHEMA:
-        valve = read_artefact(content, ValveModel, source)
-        return design_valve(valve, design_options(arguments, target)), True
-    compensator = read_artefact(content, Compensator, source)
-    refuse_without_options(compensator, source)
-    _refuse_other_choices(compensator, f"'{source}'", arguments)
-    return compensator, False
-
-
-def _refuse_other_choices(compensator: "Compensator", source: str, choices: DesignChoices) -> None:
-    """Refuse options that a compensator was not designed with.
-
-    Its own may be given again, as by the options file of all commands.
-    """
-    designed = compensator.options or {}
-    for name in DEFAULTS:
-        given = getattr(choices, name)
-        if given is not None and given != designed.get(name):
-            own = f"with {quoted(designed[name])}" if designed.get(name) else "without it"
-            raise InputError(
-                f"{flag_of(name)} is {quoted(given)}, but {source} was designed {own}; leave the option out, or run "
-                "`dzdesign design` again"
-            )

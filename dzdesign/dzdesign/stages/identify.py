@@ -1,37 +1,19 @@
 """`identify`: ramp tests -> ValveModel."""
 
 import datetime
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from dzdesign.core.artefact_files import check_file_may_be_written, check_place_of_files, write_file, write_files
 from dzdesign.core.dither import read_dithered
 from dzdesign.core.errors import InputError, quoted
 from dzdesign.core.option_readers import number, percent, quantity
-from dzdesign.core.options import (
-    FIT,
-    METER,
-    RECORDINGS,
-    AnyPath,
-    Option,
-    Paths,
-    Table,
-    Text,
-    Texts,
-    arguments_of,
-    paths_of,
-)
+from dzdesign.core.options import FIT, METER, RECORDINGS, AnyPath, Option, Paths, Table, Text, Texts, arguments_of
 from dzdesign.stages.recording_choices import in_order, parts_of, stated_order
-from dzdesign.stages.recordings import (
-    RampArguments,
-    check_places,
-    expand,
-    meter_choices,
-    read_recordings,
-    refuse_copies,
-    write_results,
-)
+from dzdesign.stages.recordings import RampArguments, expand, meter_choices, read_recordings, refuse_copies
 from dzdesign.terminal.progress import stage_progress
 
 if TYPE_CHECKING:
@@ -153,35 +135,54 @@ def identify(arguments: IdentifyArguments) -> "ValveModel":
     >>> valve.positive.trend, round(valve.positive.reference.u_min_V, 2)
     ('decreasing', 5.22)
     """
+    from dzdesign.core.artefact_types import to_json_bytes
     from dzdesign.identify.identification import identify_sides
     from dzdesign.identify.plots.valve_plots import plot_files
     from dzdesign.identify.reading.low_flow_readings import read_low_flow
-    from dzdesign.identify.valve.model import ValveModel
 
     options, record = identify_options(arguments), record_of(arguments.record)
-    check_places(ValveModel, arguments.output, arguments.plots)
+    _check_places(arguments)
     paths = expand(arguments.ramps)
     tests = _read(arguments, options, paths)
     by_hand = read_low_flow(arguments.low_flow, options.u_max)
     refuse_copies(tests)
-    asked = None if arguments.order is None else paths_of(arguments.order)
-    tests, order = in_order(tests, paths, asked), stated_order(tests, paths, asked)
+    order = stated_order(tests, paths, arguments.order)
+    tests = in_order(tests, order)
     with stage_progress(f"fitting {len(tests)} recording{'s' if len(tests) > 1 else ''}"):
         found = identify_sides(tests, options, record, by_hand)
     stated = stated_options(arguments, order)
     found = replace(found, model=replace(found.model, options=stated))
-    write_results(found.model, arguments.output, arguments.plots, lambda: plot_files(found))
+    if arguments.output is not None:
+        write_file(Path(arguments.output), to_json_bytes(found.model), found.model.schema)
+    if arguments.plots is not None:
+        with stage_progress("drawing"):
+            write_files(Path(arguments.plots), plot_files(found), "--plots")
     return found.model
+
+
+def _check_places(arguments: IdentifyArguments) -> None:
+    """Refuse places where valve.json or plots can't be written, or which would take each other's."""
+    from dzdesign.core.artefact_types import schema_of
+    from dzdesign.identify.valve.model import ValveModel
+
+    output, plots = arguments.output, arguments.plots
+    if output is not None:
+        check_file_may_be_written(Path(output), schema_of(ValveModel))
+    if plots is None:
+        return
+    if not os.fspath(plots):
+        raise InputError("--plots is empty, expected the name of a folder, such as plots")
+    folder = Path(plots)
+    check_place_of_files(folder, "--plots")
+    if output is not None and Path(output).absolute() in (folder.absolute(), *folder.absolute().parents):
+        raise InputError(f"--plots '{plots}' lies at '{output}', where -o puts a file; choose another --plots")
 
 
 def _read(
     arguments: IdentifyArguments, options: "IdentifyOptions", paths: Paths, names: Sequence[str] = ()
 ) -> "list[RampTest]":
     """Read the recordings, those parts that are asked for."""
-    tests = read_recordings(
-        paths, u_max=options.u_max, columns=arguments.columns, dp=arguments.dp,
-        sample_rate=arguments.sample_rate, skip_rows=arguments.skip_rows, missing=arguments.missing, names=names,
-    )  # fmt: skip
+    tests = read_recordings(paths, arguments, options.u_max, names=names)
     return parts_of(tests, arguments.from_, arguments.to)
 
 
@@ -217,7 +218,6 @@ def read_again(options: "StatedOptions", files: Mapping[str, Path]) -> ReadAgain
         If an option or a file can't be read.
     """
     from dzdesign.identify.reading.low_flow_readings import read_low_flow
-    from dzdesign.identify.reading.series import in_stated_order
 
     known = {argument.name for argument in arguments_of(IdentifyArguments)} - {*NOT_STATED, "order"}
     given: dict[str, Any] = {**options.texts, **options.tables, **options.lists}
@@ -226,13 +226,7 @@ def read_again(options: "StatedOptions", files: Mapping[str, Path]) -> ReadAgain
         raise InputError(f"its options name {quoted(strange[0])}, which is no option of `identify`")
     arguments = IdentifyArguments([], **given)
     choices = identify_options(arguments)
-    tests = _read(arguments, choices, list(files.values()), list(files))
-    if order:
-        by_name = {test.source: test for test in tests}
-        if sorted(order) != sorted(by_name):
-            raise InputError("its option order does not name each recording once")
-        stated = {test.source: test for test in in_stated_order([by_name[name] for name in order])}
-        tests = [stated[test.source] for test in tests]
+    tests = in_order(_read(arguments, choices, list(files.values()), list(files)), order)
     return ReadAgain(options=choices, tests=tests, by_hand=read_low_flow(arguments.low_flow, choices.u_max))
 
 

@@ -4,7 +4,7 @@ import json
 import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, dataclass, field, replace
 from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Annotated
@@ -14,14 +14,7 @@ from dzdesign.core.display import strict_templates
 from dzdesign.core.errors import InputError, one_line
 from dzdesign.core.options import AnyPath, Option, Paths, Table, paths_of, read_options
 from dzdesign.core.recorded_units import AS_COMPUTED
-from dzdesign.stages.recordings import (
-    ColumnArguments,
-    distinct_names,
-    expand,
-    read_missing,
-    read_recordings,
-    refuse_copies,
-)
+from dzdesign.stages.recordings import ColumnArguments, distinct_names, expand, read_recordings, refuse_copies
 from dzdesign.terminal.progress import say, stage_progress, with_bar
 
 if TYPE_CHECKING:
@@ -71,19 +64,17 @@ class _Remarks:
     notes: list[str] = field(default_factory=list)
 
 
-def propose(
-    ramps: Paths, *, columns: Table, dp: Table, sample_rate: str | None = None, skip_rows: int | None = None,
-    missing: Sequence[str] = (),
-) -> Proposal:  # fmt: skip
+def propose(arguments: "InitArguments") -> Proposal:
     """Look at recordings, and return the file of options that this gives."""
     from dzdesign.identify.reading.column_labels import PER_CENT, parse_columns
     from dzdesign.identify.reading.columns import propose_columns
 
-    patterns, remarks = paths_of(ramps), _Remarks()
+    patterns, remarks, dp, columns = paths_of(arguments.ramps), _Remarks(), arguments.dp, arguments.columns
+    read = read_options(arguments, ["skip_rows", "missing"])
     paths = expand(patterns) if patterns else _found_recordings()
     given = parse_columns(columns) if columns else {}
     looks = [
-        propose_columns(path, given, skip_rows, time_is_declared=bool(sample_rate))
+        propose_columns(path, given, read["skip_rows"], time_is_declared=bool(arguments.sample_rate))
         for path in with_bar(paths, "looking at columns")
     ]
     chosen, unclear = _columns_of_all(looks, given, bool(dp), remarks)
@@ -94,10 +85,7 @@ def propose(
         (look.known | look.proposed)["u"].unit.lower().endswith(PER_CENT) for look in looks
     )
     if not remarks.opens:
-        tests = read_recordings(
-            paths, u_max=u_max, columns=chosen, dp=table or None, sample_rate=sample_rate, skip_rows=skip_rows,
-            missing=missing or None,
-        )  # fmt: skip
+        tests = read_recordings(paths, replace(arguments, columns=chosen, dp=table or None), u_max)
         if in_per_cent:
             remarks.notes.append('full command: in per cent, so not recorded; u-max = "10 V" is a guess, correct it')
         else:
@@ -105,8 +93,9 @@ def propose(
         valve = _identified(tests, u_max, guessed_dp, remarks)
     seen, opens = tuple(_summary(looks, u_seen, valve, remarks.notes)), tuple(dict.fromkeys(remarks.opens))
     text = _rendered(
-        seen=seen, opens=opens, u_max=u_max, u_seen=u_seen, in_per_cent=in_per_cent, skip_rows=skip_rows,
-        missing=missing, ends_at_full=ENDS_AT_FULL, sample_rate=sample_rate,
+        seen=seen, opens=opens, u_max=u_max, u_seen=u_seen, in_per_cent=in_per_cent,
+        skip_rows=read["skip_rows"], missing=read["missing"] or (), ends_at_full=ENDS_AT_FULL,
+        sample_rate=arguments.sample_rate,
         meter=valve and valve.meter, negative_drop=_negative_drop(valve),
         first=paths[0].name, look=looks[0], columns=chosen,
         unclear=unclear, guessed_dp=guessed_dp, dp=table, readings=readings,
@@ -316,14 +305,7 @@ def init(arguments: InitArguments) -> Proposal:
                 f"'{output}' exists, and init never writes over a file; give another name with -o, or move it away"
             )
         check_file_may_be_written(Path(output))
-    proposal = propose(
-        arguments.ramps,
-        columns=arguments.columns,
-        dp=arguments.dp,
-        sample_rate=arguments.sample_rate,
-        skip_rows=read_options(arguments, ["skip_rows"])["skip_rows"],
-        missing=read_missing(arguments.missing),
-    )
+    proposal = propose(arguments)
     if output is not None:
         write_file(Path(output), proposal.text)
     return proposal

@@ -1,6 +1,5 @@
 """Which part of each recording is read (`--from`, `--to`), and in which order they were taken (`--order`)."""
 
-import fnmatch
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -9,6 +8,7 @@ from typing import TYPE_CHECKING
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.options import Paths, Table, paths_of
 from dzdesign.core.units import parse_quantity
+from dzdesign.stages.recordings import is_named, said_of
 
 if TYPE_CHECKING:
     from dzdesign.identify.reading.ramp_test import RampTest
@@ -28,7 +28,7 @@ def parts_of(tests: "Sequence[RampTest]", start: Table, end: Table) -> "list[Ram
     """
     for option, table in (("from", start), ("to", end)):
         for pattern in table if isinstance(table, Mapping) else ():
-            if not any(_is_named(pattern, test.source) for test in tests):
+            if not any(is_named(pattern, test.source) for test in tests):
                 known = [test.source for test in tests]
                 raise InputError(
                     f"[{option}] names '{pattern}', which is no recording here{nearest(pattern, known)}; correct the "
@@ -37,21 +37,10 @@ def parts_of(tests: "Sequence[RampTest]", start: Table, end: Table) -> "list[Ram
     return [_part(test, _seconds(test.source, start, "from"), _seconds(test.source, end, "to")) for test in tests]
 
 
-def _is_named(pattern: str, source: str) -> bool:
-    """Tell whether a name or a pattern of a table is a recording's, with its folders or without."""
-    names = source, source.rpartition("/")[2]
-    return pattern in names or any(fnmatch.fnmatchcase(name, pattern) for name in names)
-
-
 def _seconds(source: str, table: Table, option: str) -> float | None:
-    """Return what an option, or its table, says of a recording, s; a name takes precedence over a pattern."""
-    if table is None:
-        return None
-    if isinstance(table, str):
-        return parse_quantity(table, "time", f"--{option}")
-    patterns = [name for name in (source, source.rpartition("/")[2]) if name in table]
-    patterns += [pattern for pattern in table if _is_named(pattern, source)]
-    return parse_quantity(table[patterns[0]], "time", f"[{option}] '{patterns[0]}'") if patterns else None
+    """Return what an option, or its table, says of a recording, s."""
+    said = said_of(source, table, option)
+    return parse_quantity(said[0], "time", said[1]) if said else None
 
 
 def _part(test: "RampTest", start: float | None, end: float | None) -> "RampTest":
@@ -87,8 +76,21 @@ def _part(test: "RampTest", start: float | None, end: float | None) -> "RampTest
     return dataclasses.replace(test.part(kept), left_out=tuple(stretches(test, np.flatnonzero(~kept), "option")))
 
 
-def in_order(tests: "Sequence[RampTest]", paths: Sequence[Path], order: Paths | None) -> "list[RampTest]":
-    """Return recordings, read from `paths`, with the times at which they began, where --order states them.
+def in_order(tests: "Sequence[RampTest]", order: Sequence[str]) -> "list[RampTest]":
+    """Return recordings with the times at which they began, where an order of their names is stated."""
+    from dzdesign.identify.reading.series import in_stated_order
+
+    if not order:
+        return list(tests)
+    by_name = {test.source: test for test in tests}
+    if sorted(order) != sorted(by_name):
+        raise InputError("its option order does not name each recording once")
+    stated = {test.source: test for test in in_stated_order([by_name[name] for name in order])}
+    return [stated[test.source] for test in tests]
+
+
+def stated_order(tests: "Sequence[RampTest]", paths: Sequence[Path], order: Paths | None) -> tuple[str, ...]:
+    """Return the names of the recordings, read from `paths`, in the order that --order states; none without it.
 
     An item of the order is a recording, by its file name or path, or several with commas between them.
 
@@ -97,28 +99,16 @@ def in_order(tests: "Sequence[RampTest]", paths: Sequence[Path], order: Paths | 
     InputError
         If an item is not a recording's, or a recording is missing.
     """
-    from dzdesign.identify.reading.series import in_stated_order
-
     if order is None:
-        return list(tests)
-    places = _places(tests, paths, order)
+        return ()
+    places = [place for item in paths_of(order) for place in _named(os.fspath(item), paths, tests)]
     twice = next((place for count, place in enumerate(places) if place in places[:count]), None)
     missing = next((place for place in range(len(tests)) if place not in places), None)
     if twice is not None:
         raise _wrong(f"names '{tests[twice].source}' twice")
     if missing is not None:
         raise _wrong(f"lacks '{tests[missing].source}'")
-    stated = dict(zip(places, in_stated_order([tests[place] for place in places]), strict=True))
-    return [stated[place] for place in range(len(tests))]
-
-
-def stated_order(tests: "Sequence[RampTest]", paths: Sequence[Path], order: Paths | None) -> tuple[str, ...]:
-    """Return the names of the recordings in the order of taking, as `in_order` read it; none where none is stated."""
-    return () if order is None else tuple(tests[place].source for place in _places(tests, paths, order))
-
-
-def _places(tests: "Sequence[RampTest]", paths: Sequence[Path], order: Paths) -> list[int]:
-    return [place for item in paths_of(order) for place in _named(os.fspath(item), paths, tests)]
+    return tuple(tests[place].source for place in places)
 
 
 def _wrong(what: str) -> InputError:

@@ -3,38 +3,19 @@
 import fnmatch
 import glob
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from dzdesign.core.artefact_files import (
-    MANIFEST_NAME,
-    check_file_may_be_written,
-    check_place_of_files,
-    write_file,
-    write_files,
-)
+from dzdesign.core.artefact_files import MANIFEST_NAME
 from dzdesign.core.errors import InputError, nearest, neighbour, quoted
 from dzdesign.core.option_readers import percent_range, quantity, whole_number, with_tolerance
-from dzdesign.core.options import (
-    FIT,
-    METER,
-    RECORDINGS,
-    AnyPath,
-    Option,
-    Paths,
-    Table,
-    Text,
-    Texts,
-    paths_of,
-    read_options,
-)
+from dzdesign.core.options import FIT, METER, RECORDINGS, Option, Paths, Table, Text, Texts, paths_of, read_options
 from dzdesign.core.units import parse_quantity
-from dzdesign.terminal.progress import say, stage_progress, with_bar
+from dzdesign.terminal.progress import say, with_bar
 
 if TYPE_CHECKING:
-    from dzdesign.core.artefact_types import Artefact
     from dzdesign.identify.reading.ramp_test import RampTest
 
 
@@ -46,10 +27,8 @@ def read_sample_rate(text: str, option: str) -> float:
     return rate
 
 
-def read_missing(given: Texts | None, option: str = "--missing") -> tuple[str, ...]:
+def read_missing(given: Texts, option: str) -> tuple[str, ...]:
     """Read --missing: texts with commas between them, or one or several an item."""
-    if given is None:
-        return ()
     texts = [given] if isinstance(given, str) or not isinstance(given, Iterable) else list(given)
     if not all(isinstance(text, str) for text in texts):
         raise InputError(f"{option} is {quoted(given)}, expected texts such as 'Sensor off, -500'")
@@ -107,18 +86,10 @@ def meter_choices(arguments: RampArguments, names: Iterable[str]) -> dict[str, A
 
 
 def read_recordings(
-    patterns: Paths,
-    *,
-    u_max: float,
-    columns: Table,
-    dp: Table,
-    sample_rate: Text = None,
-    skip_rows: int | str | None = None,
-    missing: Texts | None = None,
-    what: str = "reading recordings",
+    patterns: Paths, arguments: ColumnArguments, u_max: float, what: str = "reading recordings",
     names: Sequence[str] = (),
-) -> "list[RampTest]":
-    """Read the recordings that patterns name, by the options of those names; `u_max`, V, is what 100 % means.
+) -> "list[RampTest]":  # fmt: skip
+    """Read the recordings that patterns name, with the columns of the arguments; `u_max`, V, is what 100 % means.
 
     Refuses a file that can't be read, or has no pressure drop where [dp] names those of others. `what` is for the bar;
     `names` are those of the recordings, one a file, where they are not those of the files.
@@ -127,24 +98,23 @@ def read_recordings(
     from dzdesign.identify.reading.ramp_files import read_ramp_file
     from dzdesign.identify.reading.scaling import unit_of_pressure
 
-    chosen = parse_columns(columns) if columns else {}
-    skipped = None if skip_rows is None else read_skip_rows(skip_rows, "--skip-rows")
-    rate = None if sample_rate is None else read_sample_rate(sample_rate, "--sample-rate")
+    chosen, dp = parse_columns(arguments.columns) if arguments.columns else {}, arguments.dp
+    read = read_options(arguments, ["sample_rate", "skip_rows", "missing"])
     paths = expand(patterns)
     names = names or distinct_names(paths)
     tests = []
     for path, name in with_bar(list(zip(paths, names, strict=True)), what):
-        declared = _declared_dp(name, dp)
+        declared = said_of(name, dp, "dp")
         test = read_ramp_file(
             path, u_max, columns=chosen, dp=declared and parse_quantity(declared[0], "pressure", declared[1]),
-            sample_rate=rate, skip_rows=skipped, missing=read_missing(missing),
+            sample_rate=read["sample_rate"], skip_rows=read["skip_rows"], missing=read["missing"] or (),
         )  # fmt: skip
         units = test.units if declared is None else {**test.units, **unit_of_pressure(declared[0])}
         tests.append(replace(test, source=name, units=units))
     _refuse_unnamed(tests, dp)
     if dp is None and len(tests) > 1:
         for path, test in zip(paths, tests, strict=True):
-            if test.dp is None and (why := _unclear_pressures(path, chosen, skipped)):
+            if test.dp is None and (why := _unclear_pressures(path, chosen, read["skip_rows"])):
                 raise InputError(f"'{test.source}' has no column of dP: {why}")
     return tests
 
@@ -205,19 +175,19 @@ def distinct_names(paths: list[Path]) -> list[str]:
     return names
 
 
-def _declared_dp(name: str, declared: Table) -> tuple[str, str] | None:
-    """Return the pressure drop that --dp or [dp] declares for a file, and where; a name goes before a pattern.
+def is_named(pattern: str, name: str) -> bool:
+    """Tell whether a name or a pattern of a table is a recording's, with its folders or without."""
+    names = name, name.rpartition("/")[2]
+    return pattern in names or any(fnmatch.fnmatchcase(each, pattern) for each in names)
 
-    The name may have folders before it, where they tell two files apart; [dp] may leave them out.
-    """
-    if declared is None:
-        return None
-    if isinstance(declared, str):
-        return declared, "--dp"
-    last = name.rpartition("/")[2]
-    patterns = [known for known in (name, last) if known in declared]
-    patterns += [each for each in declared if fnmatch.fnmatchcase(name, each) or fnmatch.fnmatchcase(last, each)]
-    return (declared[patterns[0]], f"[dp] '{patterns[0]}'") if patterns else None
+
+def said_of(name: str, table: Table, option: str) -> tuple[str, str] | None:
+    """Return what an option, or its table, says of a recording, and where; a name goes before a pattern."""
+    if table is None or isinstance(table, str):
+        return None if table is None else (table, f"--{option}")
+    patterns = [known for known in (name, name.rpartition("/")[2]) if known in table]
+    patterns += [pattern for pattern in table if is_named(pattern, name)]
+    return (table[patterns[0]], f"[{option}] '{patterns[0]}'") if patterns else None
 
 
 def _refuse_unnamed(tests: list["RampTest"], declared: Table) -> None:
@@ -251,32 +221,3 @@ def refuse_copies(tests: Sequence["RampTest"]) -> None:
             f"{copy.compared} rows with flow are in both. Give it once. A repeated ramp test is welcome, but a copy is "
             "no repetition, nor is a second run of a simulation without noise"
         )
-
-
-def check_places(kind: "type[Artefact]", output: AnyPath | None, plots: AnyPath | None) -> None:
-    """Refuse places where the artefact or its plots can't be written, or which would take each other's."""
-    from dzdesign.core.artefact_types import schema_of
-
-    if output is not None:
-        check_file_may_be_written(Path(output), schema_of(kind))
-    if plots is None:
-        return
-    if not os.fspath(plots):
-        raise InputError("--plots is empty, expected the name of a folder, such as plots")
-    folder = Path(plots)
-    check_place_of_files(folder, "--plots")
-    if output is not None and Path(output).absolute() in (folder.absolute(), *folder.absolute().parents):
-        raise InputError(f"--plots '{plots}' lies at '{output}', where -o puts a file; choose another --plots")
-
-
-def write_results(
-    artefact: "Artefact", output: AnyPath | None, plots: AnyPath | None, draw: Callable[[], Mapping[str, bytes]]
-) -> None:
-    """Write an artefact, and the plots that `draw` returns, where places are named for them."""
-    from dzdesign.core.artefact_types import to_json_bytes
-
-    if output is not None:
-        write_file(Path(output), to_json_bytes(artefact), artefact.schema)
-    if plots is not None:
-        with stage_progress("drawing"):
-            write_files(Path(plots), draw(), "--plots")

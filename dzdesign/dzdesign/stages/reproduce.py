@@ -27,7 +27,7 @@ class ReproduceArguments:
 def reproduce(arguments: ReproduceArguments) -> "Reproduction":
     """Reproduce the paper's numbers and figures, and write them to a folder."""
     from dzdesign.core.artefact_types import THIS_TOOL, schema_of, to_json_bytes
-    from dzdesign.reproduce import chain, figures, numbers
+    from dzdesign.reproduce import figures, numbers, runs
     from dzdesign.reproduce.artefact import Reproduction
     from dzdesign.reproduce.recovered_valves import recover_valves
     from dzdesign.verify.toolchain.host_compiler import host_compiler
@@ -38,18 +38,18 @@ def reproduce(arguments: ReproduceArguments) -> "Reproduction":
     check_folder_may_be_written(folder, schema)
     host_compiler()
     with stage_progress("recovering the valves' parameters from the printed figures") as stage:
-        chains = [chain.run_chain(valve, say=stage) for valve in recover_valves()]
-        runs = [each.runs for each in chains]
+        chains = [runs.run_chain(valve, say=stage) for valve in recover_valves()]
+        ran = [each.runs for each in chains]
         reproduction = Reproduction(
             tool=THIS_TOOL,
             made_from=(),
             paper=PAPER_DOI,
             assumptions=numbers.ASSUMPTIONS,
-            numbers=tuple(numbers.paper_numbers(runs)),
+            numbers=tuple(numbers.paper_numbers(ran)),
             valves=tuple(each.valve for each in chains),
         )
         stage("drawing")
-        drawn = figures.figure_files(runs)
+        drawn = figures.figure_files(ran)
     files: dict[str, str | bytes] = {**drawn, Reproduction.FILE_NAME: to_json_bytes(reproduction)}
     for each in chains:
         files |= each.files

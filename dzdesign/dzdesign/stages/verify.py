@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from dzdesign.codegen.other_targets import Output
     from dzdesign.codegen.project import Firmware
     from dzdesign.identify.valve.model import ValveModel
-    from dzdesign.verify.folder import Regenerated
     from dzdesign.verify.outputs.verification import OutputVerification
     from dzdesign.verify.requirements import Check
     from dzdesign.verify.verification import Verification
@@ -79,15 +78,7 @@ def verify(arguments: VerifyArguments) -> "Verification | OutputVerification":
     with _firmware_folder(arguments.firmware) as folder:
         if holds_output(folder):
             return verify_output_folder(folder, arguments)
-        return _verify_firmware(folder, arguments)
-
-
-def verify_firmware(
-    arguments: VerifyArguments, plant_source: str = "", identified: "ValveModel | None" = None
-) -> "Verification":
-    """Verify a C firmware; what this very run has `identified` from the given ramps is not identified again."""
-    with _firmware_folder(arguments.firmware) as folder:
-        return _verify_firmware(folder, arguments, plant_source, identified)
+        return verify_firmware(replace(arguments, firmware=folder))
 
 
 def verify_output_folder(
@@ -112,63 +103,51 @@ def verify_output_folder(
     return verification
 
 
-def _verify_firmware(
-    folder: Path, arguments: VerifyArguments, plant_source: str = "", identified: "ValveModel | None" = None
+def verify_firmware(
+    arguments: VerifyArguments, plant_source: str = "", identified: "ValveModel | None" = None
 ) -> "Verification":
-    """Verify a C firmware: what is compiled and run is the text that is generated here and now."""
-    from dzdesign.regeneration import regenerated
-    from dzdesign.verify.verification import SCHEMA
+    """Verify a C firmware: what is compiled and run is the text that is generated here and now.
 
-    if arguments.output is not None:
-        check_folder_may_be_written(Path(arguments.output), SCHEMA)
-    again = regenerated(folder)
-    with again.written() as code:
-        return _verify_code(folder, again, code, arguments, plant_source, identified)
-
-
-def _verify_code(
-    folder: Path,
-    again: "Regenerated",
-    code: Path,
-    arguments: VerifyArguments,
-    plant_source: str,
-    identified: "ValveModel | None",
-) -> "Verification":
-    """Verify a C firmware whose code is compiled and run from a folder of its own."""
+    What this very run has `identified` from the given ramps is not identified again.
+    """
     from dzdesign.block_checks import blocks_checked, given_blocks
+    from dzdesign.regeneration import regenerated
     from dzdesign.report.valve_report import with_report
     from dzdesign.verify.closed_loop.plant import read_plant
-    from dzdesign.verify.verification import Asked, evidence_manifest
+    from dzdesign.verify.verification import SCHEMA, Asked, evidence_manifest
     from dzdesign.verify.verification import verify as verify_folder
 
-    plant, digest = None, None
-    if arguments.plant is not None:
-        plant = read_plant(Path(arguments.plant), say)
-        digest = sha256_of(read_bytes(Path(arguments.plant), "plant file"))
-        plant_source = plant_source or Path(arguments.plant).name  # how the evidence calls the plant
-    ramps = _ramp_checks(folder, arguments, identified)
-    blocks = given_blocks(folder, expand(arguments.blocks) if paths_of(arguments.blocks) else [])
-    with stage_progress() as stage:
+    output, plant, digest = None if arguments.output is None else Path(arguments.output), None, None
+    if output is not None:
+        check_folder_may_be_written(output, SCHEMA)
+    with _firmware_folder(arguments.firmware) as folder:
+        again = regenerated(folder)
+        if arguments.plant is not None:
+            plant = read_plant(Path(arguments.plant), say)
+            digest = sha256_of(read_bytes(Path(arguments.plant), "plant file"))
+            plant_source = plant_source or Path(arguments.plant).name  # how the evidence calls the plant
+        ramps = _ramp_checks(folder, arguments, identified)
+        blocks = given_blocks(folder, expand(arguments.blocks) if paths_of(arguments.blocks) else [])
+        with again.written() as code, stage_progress() as stage:
 
-        def of_blocks(_: bool) -> "list[Check]":
-            stage("comparing every input with each of the calibration blocks")
-            return blocks_checked(folder, blocks, code)
+            def of_blocks(_: bool) -> "list[Check]":
+                stage("comparing every input with each of the calibration blocks")
+                return blocks_checked(folder, blocks, code)
 
-        asked = Asked(
-            plant=plant,
-            plant_source=plant_source,
-            plant_sha256=digest,
-            backs_MPa=_back_pressures_MPa(texts_of(arguments.back_pressure)),
-            include=[Path(place) for place in paths_of(arguments.include)],
-            machine_code=arguments.machine_code,
-            ramps=partial(ramps, stage) if ramps else None,
-            blocks=of_blocks if blocks else None,
-        )
-        verification = verify_folder(folder, asked, again, code, stage, stage.each)
-    if arguments.output is not None:
-        output = Path(arguments.output)
-        manifest = evidence_manifest(verification.evidence)
-        write_folder(output, with_report(verification, folder, output), manifest)
+            asked = Asked(
+                plant=plant,
+                plant_source=plant_source,
+                plant_sha256=digest,
+                backs_MPa=_back_pressures_MPa(texts_of(arguments.back_pressure)),
+                include=[Path(place) for place in paths_of(arguments.include)],
+                machine_code=arguments.machine_code,
+                ramps=partial(ramps, stage) if ramps else None,
+                blocks=of_blocks if blocks else None,
+            )
+            verification = verify_folder(folder, asked, again, code, stage, stage.each)
+            if output is not None:
+                files = with_report(verification, folder, output)
+                write_folder(output, files, evidence_manifest(verification.evidence))
     return verification
 
 
@@ -176,12 +155,12 @@ def _ramp_checks(
     folder: Path, arguments: VerifyArguments, identified: "ValveModel | None"
 ) -> "Callable[[Callable[[str], None], bool], list[Check]] | None":
     """Return what checks a folder with the recordings that were given, for `say` and whether the core ran."""
-    from dzdesign.regeneration import GivenFiles, identified_again, inputs_again
+    from dzdesign.regeneration import given_files, identified_again, inputs_again
     from dzdesign.verify.folder import read_compensator
 
     if not paths_of(arguments.ramps):
         return None
-    recordings = GivenFiles.read(arguments.ramps)
+    recordings = given_files(arguments.ramps)
 
     def checks(stage: "Callable[[str], None]", runs: bool) -> "list[Check]":
         stage("identifying again" if identified is None else "comparing with the ramp tests")

@@ -2,13 +2,14 @@
 
 import io
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from dzdesign.core.errors import one_line
 from dzdesign.terminal.design_tables import print_compensator
+from dzdesign.terminal.evidence_tables import print_output_verification, print_verification
+from dzdesign.terminal.output_tables import print_output
 from dzdesign.terminal.page import FILE_WIDTH, put_line
-from dzdesign.terminal.tables import print_firmware, print_output, print_valve
-from dzdesign.terminal.verification_tables import print_output_verification, print_verification
+from dzdesign.terminal.tables import print_firmware, print_valve
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -35,18 +36,14 @@ def _compensator_heading(compensator: "Compensator") -> str:
     return f"Compensator{target}, law {compensator.law}, of a valve of {full}"
 
 
-def _print_firmware(firmware: "Firmware", console: "Console") -> None:
-    """Print its files, and the note that the command line has on standard error."""
-    print_firmware(firmware, console)
-    if firmware.note:
-        put_line(console, firmware.note)
-
-
-def _print_output(output: "Output", console: "Console") -> None:
-    """Print its files, and the note that the command line has on standard error."""
-    print_output(output, console)
-    if output.note:
-        put_line(console, output.note)
+def _print_made(made: "Firmware | Output", console: "Console") -> None:
+    """Print the files, and the note that the command line has on standard error."""
+    if type(made).__name__ == "Firmware":
+        print_firmware(cast("Firmware", made), console)
+    else:
+        print_output(cast("Output", made), console)
+    if made.note:
+        put_line(console, made.note)
 
 
 #: Class of a result -> its heading, and what prints it.
@@ -55,11 +52,11 @@ PAGES: Mapping[str, tuple[Callable[[Any], str], Callable[[Any, "Console"], None]
     "Compensator": (_compensator_heading, print_compensator),
     "Firmware": (
         lambda made: f"Firmware for {made.manifest.target}, law {made.manifest.law}, {len(made.files)} files",
-        _print_firmware,
+        _print_made,
     ),
     "Output": (
         lambda made: f"Output for {made.manifest.target}, law {made.manifest.law}, {len(made.files)} files",
-        _print_output,
+        _print_made,
     ),
     "Verification": (lambda verification: f"Verification: {verification.verdict}", print_verification),
     "OutputVerification": (lambda verification: f"Verification: {verification.verdict}", print_output_verification),

@@ -4,11 +4,12 @@ from functools import partial
 from math import isinf
 from typing import TYPE_CHECKING
 
+from dzdesign.core.artefact_files import MANIFEST_NAME
 from dzdesign.terminal.page import Column, new_console, put_line, put_rows
 from dzdesign.terminal.tables import put_units
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from rich.console import Console
 
@@ -19,60 +20,63 @@ if TYPE_CHECKING:
         SensorReading,
         SideReading,
     )
+    from dzdesign.codegen.other_targets import Output
     from dzdesign.core.recorded_units import RecordedUnits
-    from dzdesign.design.fixed_offset import FixedDeadZone, FixedOffset
+    from dzdesign.design.compensator import Compensator
+    from dzdesign.design.fixed_offset import FixedDeadZone
     from dzdesign.report.artefacts import MadeOutputs
     from dzdesign.stages.calibration import ReadCalibration
-    from dzdesign.stages.export import AmplifierExport
 
 
 BRANCHES = ("opening", "closing")
 
 
-def print_export(made: "AmplifierExport", console: "Console | None" = None) -> None:
+def print_output(output: "Output", console: "Console | None" = None, folder: str = "") -> None:
+    """Print the files of an output other than a C firmware, and where they are; of an amplifier, its setting too."""
+    console = console or new_console()
+    place = f", in folder '{folder}'" if folder else ""
+    settings = output.manifest.settings_in_words
+    put_line(console, f"Output for {output.manifest.target}{settings}, law '{output.manifest.law}'{place}:")
+    for name in (*output.contents, MANIFEST_NAME):
+        put_line(console, f"  {name}")
+    if output.manifest.target == "amplifier":
+        _put_setting(console, output.compensator, output.manifest.settings)
+
+
+def _put_setting(console: "Console", compensator: "Compensator", settings: "Mapping[str, str]") -> None:
     """Print what a device is told, and for each side what is left at the tested pressure drops."""
+    from dzdesign.codegen.amplifier.files import setting_of, zones_of
     from dzdesign.design.signals import SIDE_NAMES
 
-    console = console or new_console()
-    setting, units = made.setting, made.compensator.valve.recorded_units
-    device = setting.device
-    words = ", ".join(f"{name} {counts}" for name, counts in setting.parameters.items())
-    if setting.dp_MPa is None:
-        put_line(console, f"{device.title}, {device.description}: {words} (unit {device.unit})")
-    else:
-        at = units.text(float(setting.dp_MPa), ".2f MPa")
-        put_line(console, f"{device.title}, {device.description}: law at {at}")
+    setting, units = setting_of(compensator, settings), compensator.valve.recorded_units
+    device, zones = setting.device, zones_of(setting, compensator)
+    words = ", ".join(f"{name} {counts}" for name, counts in setting.parameters.items()) + f" (unit {device.unit})"
+    if setting.dp_MPa is not None:
+        words = f"law at {units.text(float(setting.dp_MPa), '.2f MPa')}"
+    put_line(console, f"{device.title}, {device.description}: {words}")
     for sign, offset in setting.offsets.items():
-        side = SIDE_NAMES[sign]
-        label = "" if len(setting.offsets) == 1 else f"{side} side: "
-        put_line(console, label + _offset_line(made, offset, units.of_side(side)))
-        rows = [row for row in made.dead_zones if row.side == side]
-        title = f"Remaining dead zone (knee, share of command){f', {side} side' if label else ''}"
+        side, of_side = SIDE_NAMES[sign], units.of_side(SIDE_NAMES[sign])
+        certificate = compensator.side(sign).certificate
+        low, high = (float(end) for end in offset.dp_MPa)
+        put_line(
+            console,
+            ("" if len(setting.offsets) == 1 else f"{side} side: ")
+            + f"largest fixed offset under the {100 * certificate.confidence:.6g}% lower bound of the "
+            f"{certificate.guard} threshold {of_side.span(low, high, '.2f MPa')}: {float(offset.share):.3%} of full "
+            f"drive (lowest at {of_side.text(float(offset.lowest_at_MPa), '.2f MPa')}); set: "
+            f"{float(setting.characteristics[sign].offset):.3%}",
+        )
+        rows = [row for row in zones if row.side == side]
+        title = f"Remaining dead zone (knee, share of command){'' if len(setting.offsets) == 1 else f', {side} side'}"
         title += ": with the fixed setting, and with the law, which reads the pressures"
         if any(row.law_end_L_min is not None for row in rows):
-            title += f"; flow on closing at {_transition_end(made, sign):.2%} of command, the end of the transition"
-        put_rows(console, title, rows, _export_columns(rows, units.of_side(side)))
-    for check in made.checks:
-        put_line(console, f"HOLDS  {check.name}: {check.text}")
-    for note in made.notes:
-        put_line(console, f"note: {note}")
+            end = float(compensator.transition_end / compensator.signals.command.span(sign))
+            title += f"; flow on closing at {end:.2%} of command, the end of the transition"
+        put_rows(console, title, rows, _zone_columns(rows, of_side))
     put_units(console, units, "compensator.json")
-    put_line(console, f"SHA-256 of its compensator.json: {made.compensator_sha256}")
 
 
-def _offset_line(made: "AmplifierExport", offset: "FixedOffset", units: "RecordedUnits") -> str:
-    """Return what the largest safe offset is, what it lies under, and to what it was rounded."""
-    certificate = made.compensator.side(offset.sign).certificate
-    low, high = (float(end) for end in offset.dp_MPa)
-    set_to = made.setting.characteristics[offset.sign].offset
-    return (
-        f"largest fixed offset under the {100 * certificate.confidence:.6g}% lower bound of the {certificate.guard} "
-        f"threshold {units.span(low, high, '.2f MPa')}: {float(offset.share):.3%} of full drive (lowest at "
-        f"{units.text(float(offset.lowest_at_MPa), '.2f MPa')}); set: {float(set_to):.3%}"
-    )
-
-
-def _export_columns(rows: "Sequence[FixedDeadZone]", units: "RecordedUnits") -> "dict[str, Column[FixedDeadZone]]":
+def _zone_columns(rows: "Sequence[FixedDeadZone]", units: "RecordedUnits") -> "dict[str, Column[FixedDeadZone]]":
     """Return the columns of the table: branches that no test recorded are left out, and so is a missing transition."""
     columns: dict[str, Column[FixedDeadZone]] = {
         f"dP ({units.label('MPa')})": lambda row: units.number(row.dp_MPa, ".2f MPa"),
@@ -84,12 +88,6 @@ def _export_columns(rows: "Sequence[FixedDeadZone]", units: "RecordedUnits") -> 
         for whose in ("fixed", "law"):
             columns[f"{whose}: flow ({units.label('L/min')})"] = partial(_flow, whose=whose, units=units)
     return columns
-
-
-def _transition_end(made: "AmplifierExport", sign: int) -> float:
-    """Return the command at which the transition ends, as a share of full command."""
-    compensator = made.compensator
-    return float(compensator.transition_end / compensator.signals.command.span(sign))
 
 
 def _share(row: "FixedDeadZone", whose: str, branch: str) -> str:

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
-    from dzdesign.codegen.other_targets import Output
     from dzdesign.codegen.project import Firmware
     from dzdesign.core.recorded_units import RecordedUnits
     from dzdesign.identify.valve.model import ValveModel
@@ -254,14 +253,4 @@ def print_firmware(firmware: "Firmware", console: "Console | None" = None, folde
     manifest = firmware.manifest
     put_line(console, f"Firmware for target {manifest.target} with law '{manifest.law}'{common}{place}:")
     for name in (*firmware.contents, MANIFEST_NAME):
-        put_line(console, f"  {name}")
-
-
-def print_output(output: "Output", console: "Console | None" = None, folder: str = "") -> None:
-    """Print the files of an output other than a C firmware, and in which folder they are."""
-    console = console or new_console()
-    place = f", in folder '{folder}'" if folder else ""
-    settings = output.manifest.settings_in_words
-    put_line(console, f"Output for {output.manifest.target}{settings}, law '{output.manifest.law}'{place}:")
-    for name in (*output.contents, MANIFEST_NAME):
         put_line(console, f"  {name}")

@@ -5,8 +5,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from dzdesign.assess.assessment import Assessment, PressureAssessment
-from dzdesign.assess.limits import LIMITED
 from dzdesign.assess.options import Set
+from dzdesign.assess.quantities import LIMITED
 from dzdesign.core.display import DOES_NOT_HOLD, NOT_CHECKED, verdict_words
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.certificate import reach_of_certificate

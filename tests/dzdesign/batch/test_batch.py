@@ -36,14 +36,14 @@ from dzdesign.report.lot.table import read_manifest
 from dzdesign.stages.identify import IdentifyChoices
 from dzdesign.verify.requirements import RAMPS
 from tests.dzdesign.batch.crashing_work import die_over_bad
-from tests.support.many_valves import PRESSURES_MPa, lot_bench, write_lot
+from tests.support.many_valves import LOT_TOML, PRESSURES_MPa, lot_bench, lot_options, write_lot
 from tests.support.paths import ROOT
 from tests.support.synthetic import needs_compiler
 
 pytestmark = pytest.mark.slow
 
 SEED, COUNT = 7, 12
-OPTIONS = ["--meter-lag", "0.1 s", "--target", "host"]
+OPTIONS = ["--config", str(LOT_TOML), "--target", "host"]
 NOTHING = dict(recordings=(), identify=IdentifyChoices(), design=DesignChoices(), target="host")
 
 
@@ -110,7 +110,8 @@ def test_a_valve_of_a_batch_has_the_bytes_of_the_commands(lot, made, tmp_path, m
     folder, _ = lot
     monkeypatch.chdir(tmp_path)
     assert main(["identify", str(folder / "V0001" / "*.csv"), "--meter-lag", "0.1 s"]) == 0
-    assert main(["codegen", "valve.json", "--target", "host"]) == 0
+    assert main(["design", "valve.json", "--target", "host"]) == 0
+    assert main(["codegen", "compensator.json"]) == 0
     assert Path("valve.json").read_bytes() == (made / "valves/V0001/valve.json").read_bytes()
     assert tree(Path("firmware")) == tree(made / "valves/V0001/firmware")
 
@@ -180,7 +181,7 @@ def test_two_batches_do_not_share_a_folder(lot, copy, capsys):
     assert "another batch is writing into" in capsys.readouterr().err and tree(copy) == before
 
 
-def test_options_are_inputs_too(lot, copy, monkeypatch):
+def test_options_are_inputs_too(lot, copy, tmp_path, monkeypatch):
     seen = []
 
     def nothing(tasks, jobs):
@@ -189,12 +190,13 @@ def test_options_are_inputs_too(lot, copy, monkeypatch):
             yield task.outcome("failed", "not tried", again=True)
 
     monkeypatch.setattr("dzdesign.batch.command.run_local", nothing)
-    assert main(["batch", str(lot[0]), "-o", str(copy), "--guard", "mean", *OPTIONS]) == 1
+    command = ["batch", str(lot[0]), "-o", str(copy), *OPTIONS, *lot_options(tmp_path, 'guard = "mean"')]
+    assert main(command) == 1
     assert len(seen) == COUNT
     assert {row["status"] for row in rows(copy)} == {"failed"}
     assert not (copy / "lot_compensator.json").exists()  # of no valve now
     seen.clear()  # such an outcome is no last word: it is tried again
-    assert main(["batch", str(lot[0]), "-o", str(copy), "--guard", "mean", *OPTIONS]) == 1
+    assert main(command) == 1
     assert len(seen) == COUNT
 
 
@@ -351,14 +353,18 @@ def test_a_bad_list_stops_before_anything_is_written(text, words, tmp_path, caps
         (["--jobs", "0"], "--jobs is '0'"),
         (["--jobs", "2", "--dask", "tcp://127.0.0.1:1"], "leave it out"),
         (["--plant", "p.toml"], "or --verify"),
-        (["--meter-lag", "3 V"], "--meter-lag"),
-        (["--guard", "opning"], "did you mean 'opening'?"),
+        (["--meter-lag", "3 s"], "takes --meter-lag from the file of --config"),
+        ('meter-lag = "3 V"', "options.toml': meter-lag is '3 V'"),
+        ('guard = "opning"', "did you mean 'opening'?"),
         (["--target", "f28334"], "did you mean 'f28335'?"),
         (["-o", "SOURCE/out"], "whose subfolders are the valves"),
         (["-o", "SOURCE/../foreign"], "no folder of a batch, so it is left alone"),
     ],
 )
-def test_bad_usage_stops_before_anything_is_written(options, words, lot, capsys):
+def test_bad_usage_stops_before_anything_is_written(options, words, lot, tmp_path, capsys):
+    if isinstance(options, str):
+        (tmp_path / "options.toml").write_text(options, encoding="utf-8")
+        options = ["--config", str(tmp_path / "options.toml")]
     foreign = lot[0].parent / "foreign"
     foreign.mkdir(exist_ok=True)
     (foreign / "thesis.txt").write_text("mine")
@@ -433,7 +439,7 @@ def test_a_valve_that_lacks_a_pressure_is_named_with_the_range_without_it(lot, t
         f"coarse,{ramps}/V0007/{low};{ramps}/V0007/{high}\n"
     )
     out = tmp_path / "out"
-    assert main(["batch", str(listing), "-o", str(out), "--jobs", "1", *OPTIONS, "--curve", "line"]) == 0
+    assert main(["batch", str(listing), "-o", str(out), "--jobs", "1", *lot_options(tmp_path, 'curve = "line"')]) == 0
     said = " ".join(capsys.readouterr().out.split())
     words = (
         "short was not tested at 5 MPa, as the lot was: so the lot setting holds for all from 1 to 2.5 MPa, and "
@@ -492,8 +498,7 @@ def test_no_more_processes_than_have_something_to_do(monkeypatch):
     assert [useful_jobs(1000, waiting) for waiting in (0, 1, 3)] == [2, 2, 3]  # one alone would be this very process
 
 
-@pytest.mark.parametrize("jobs", ["1", "2"])
-@pytest.mark.parametrize("quiet", [False, True])
+@pytest.mark.parametrize(("jobs", "quiet"), [("1", True), ("2", False)])
 def test_a_batch_in_a_pipe_says_a_line_a_valve_and_none_if_quiet(jobs, quiet, tmp_path):
     """In a process of its own: of a worker, stderr is that of the process and not a test's."""
     write_lot(tmp_path / "lot", 2, 0, SEED)
@@ -517,7 +522,7 @@ def test_a_board_file_that_was_filled_in_stays_and_its_valve_with_it(tmp_path, c
     common = (out / "lot_compensator.json").read_bytes()
     assert main(command) == 0
     assert "2 of them done before" in capsys.readouterr().err
-    assert main([*command, "--guard", "mean"]) == 0  # designed anew
+    assert main([*command, *lot_options(tmp_path, 'guard = "mean"')]) == 0  # designed anew
     assert board.read_text() == filled
     assert main(command) == 0
     assert board.read_text() == filled and (out / "lot_compensator.json").read_bytes() == common

@@ -9,8 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from dzdesign.batch.lot_firmware import firmware_left
-from dzdesign.batch.summary import anomalies_of
+from dzdesign.batch.summary import anomalies_of, firmware_left
 from dzdesign.batch.valve_folders import read_valve_folder
 from dzdesign.block_checks import blocks_checked, given_blocks
 from dzdesign.codegen.calibration.block import built_for
@@ -25,7 +24,7 @@ from dzdesign.report.lot.summary import LOT_SETTING
 from dzdesign.verify.exhaustive.block_check import BlockFirmware
 from dzdesign.verify.toolchain import host_compiler
 from tests.dzdesign.batch.test_batch import tree
-from tests.support.many_valves import write_lot
+from tests.support.many_valves import LOT_TOML, write_lot
 from tests.support.synthetic import needs_compiler
 
 pytestmark = [pytest.mark.slow, needs_compiler]
@@ -36,7 +35,7 @@ TARGETS = {"V0000": "host", "V0001": "host", "V0002": "cortex-m4"}
 
 
 def batch(folder, output, *more):
-    options = ["--meter-lag", "0.1 s", "--jobs", "1", "--calibration", "block", *more]
+    options = ["--config", str(LOT_TOML), "--jobs", "1", "--calibration", "block", *more]
     return main(["batch", str(folder / "lot.csv"), "-o", str(output), *options])
 
 

@@ -27,14 +27,14 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.design_choices import DesignChoices
 from dzdesign.stages.identify import IdentifyChoices
 from tests.dzdesign.batch.crashing_work import die_over_bad
-from tests.support.many_valves import write_lot
+from tests.support.many_valves import LOT_TOML, write_lot
 from tests.support.paths import ROOT
 from tests.support.synthetic import needs_compiler
 
 pytestmark = pytest.mark.slow
 
 COUNT, SEED = 7, 7
-OPTIONS = ["--meter-lag", "0.1 s", "--target", "host"]
+OPTIONS = ["--config", str(LOT_TOML), "--target", "host"]
 #: Each block is tried by the worker that makes it, and the lot's firmware is written here.
 BLOCKS = ["--calibration", "block"]
 NOTHING = dict(recordings=(), identify=IdentifyChoices(), design=DesignChoices(), target="host")
@@ -121,9 +121,8 @@ def test_a_worker_is_killed_in_mid_run_and_nothing_is_lost(cluster, tmp_path, mo
 
 
 @pytest.mark.skipif(os.name == "nt", reason="SIGKILL is of POSIX")
-@pytest.mark.parametrize("kind", [signal.SIGTERM, getattr(signal, "SIGKILL", None)])
 def test_a_scheduler_that_dies_in_mid_run_is_one_sentence_and_what_is_done_is_kept(
-    cluster, kind, tmp_path, monkeypatch, capsys
+    cluster, tmp_path, monkeypatch, capsys
 ):
     address, worker, scheduler = cluster
     monkeypatch.chdir(tmp_path)
@@ -133,7 +132,7 @@ def test_a_scheduler_that_dies_in_mid_run_is_one_sentence_and_what_is_done_is_ke
     def kill() -> None:
         while len(whole_folders(tmp_path / "out")) < 2:
             time.sleep(0.01)
-        scheduler.send_signal(kind)
+        scheduler.send_signal(signal.SIGKILL)
 
     killer = threading.Thread(target=kill, daemon=True)
     killer.start()
@@ -154,8 +153,7 @@ def test_a_scheduler_that_dies_in_mid_run_is_one_sentence_and_what_is_done_is_ke
     assert f"{COUNT} valves, {len(done)} of them done before" in capsys.readouterr().err
 
 
-def test_a_lot_that_waits_for_a_worker_says_so_once_and_goes_on(cluster, monkeypatch, capsys):
-    monkeypatch.setattr("dzdesign.batch.runners.LOOK_S", 0.1)
+def test_a_lot_that_waits_for_a_worker_says_so_once_and_goes_on(cluster, capsys):
     address, worker, _ = cluster
     starter = threading.Timer(2, worker, ["late"])
     starter.start()

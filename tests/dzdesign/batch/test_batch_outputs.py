@@ -19,7 +19,7 @@ from dzdesign.codegen import other_targets
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import MANIFEST_NAME
 from dzdesign.core.artefact_reading import read_artefact
-from dzdesign.core.artefact_types import THIS_TOOL, to_json_bytes
+from dzdesign.core.artefact_types import THIS_TOOL
 from dzdesign.core.documents import sha256_of
 from dzdesign.core.errors import InputError
 from dzdesign.report.lot.folder import read_lot
@@ -31,7 +31,7 @@ from dzdesign.verify.evidence import TriedInputs
 from dzdesign.verify.requirements import REPRODUCED
 from tests.dzdesign.batch.test_batch import NOTHING, tree
 from tests.support.golden_firmware import golden_compensator
-from tests.support.many_valves import write_lot
+from tests.support.many_valves import lot_options, write_lot
 
 PLC = WantedOutput(target="iec61131", settings={"dialect": "codesys", "interface": "plc"}, folder="plc")
 SEED = 7
@@ -86,10 +86,7 @@ def test_a_result_depends_on_the_outputs_that_are_wanted():
 @pytest.fixture
 def of_valve(tmp_path):
     compensator = golden_compensator()
-    return ForOutputs(
-        compensator=compensator, document=to_json_bytes(compensator), valve=compensator.valve, recordings=(),
-        place=tmp_path, verify=False,
-    )  # fmt: skip
+    return ForOutputs(compensator=compensator, valve=compensator.valve, recordings=(), place=tmp_path, verify=False)
 
 
 def test_without_a_verification_it_is_not_verified(of_valve):
@@ -160,8 +157,8 @@ def made(tmp_path_factory):
     return folder
 
 
-def batch(folder, *more):
-    options = ["--meter-lag", "0.1 s", "--jobs", "1", "--outputs", "iec61131", "--dialect", "twincat", *more]
+def batch(folder):
+    options = [*lot_options(folder, 'dialect = "twincat"'), "--jobs", "1", "--outputs", "iec61131"]
     return main(["batch", str(folder / "lot.csv"), "-o", str(folder / "out"), *options])
 
 
@@ -233,7 +230,7 @@ def test_each_valve_has_the_parameters_of_its_amplifier(made, tmp_path, monkeypa
     lot, out = tmp_path / "lot", tmp_path / "out"
     for name in ("V0000", "V0001"):
         shutil.copytree(made / name, lot / name)
-    words = ["--meter-lag", "0.1 s", "--jobs", "1", "--outputs", "amplifier", "--device", "west", "--verify"]
+    words = [*lot_options(tmp_path, 'device = "west"'), "--jobs", "1", "--outputs", "amplifier", "--verify"]
     assert main(["batch", str(lot), "-o", str(out), *words]) == 0
     capsys.readouterr()
     summary = read_artefact((out / "batch.json").read_bytes(), LotSummary, "batch.json").outputs["amplifier"]

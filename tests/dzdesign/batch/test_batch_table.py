@@ -14,12 +14,12 @@ from dzdesign.command_line.cli import main
 from dzdesign.report.lot.page import report_of_lot
 from dzdesign.report.lot.table import by_name, frame_of, read_table, table_files
 from tests.support.html_pages import Page
-from tests.support.many_valves import write_lot
+from tests.support.many_valves import LOT_TOML, lot_options, write_lot
 from tests.support.synthetic_lots import lot_rows, write_lot_folder
 
 pytestmark = pytest.mark.slow
 
-OPTIONS = ["--meter-lag", "0.1 s", "--target", "host"]
+OPTIONS = ["--config", str(LOT_TOML), "--target", "host"]
 COUNTED = ["V1", "V2", "V9", "V10", "V11"]
 #: What a spreadsheet, CSV or a page could take for something else.
 HOSTILE = ["=cmd|'/c calc'!A0", "'=1", "''", "-1", "@SUM(A1)", "+49 89 1", 'a,"b"; c', "<b>x</b>", "0815", "ü"]
@@ -52,8 +52,8 @@ def counted(tmp_path_factory):
     (folder / "lot").mkdir()
     for path, name in zip(sorted((folder / "made").iterdir()), COUNTED, strict=True):
         shutil.copytree(path, folder / "lot" / name)
-    records = ["--record", "serial = 0815", "--record", 'oil = =HLP 46, "40"']
-    assert main(["batch", str(folder / "lot"), "-o", str(folder / "out"), "--jobs", "1", *OPTIONS, *records]) == 1
+    options = lot_options(folder, """[record]\nserial = "0815"\noil = '=HLP 46, "40"'""")
+    assert main(["batch", str(folder / "lot"), "-o", str(folder / "out"), "--jobs", "1", *options]) == 1
     return folder
 
 

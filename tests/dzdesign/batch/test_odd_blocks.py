@@ -2,7 +2,7 @@
 
 import pytest
 
-from dzdesign.batch.lot_firmware import foreign_block
+from dzdesign.batch.summary import foreign_block
 from dzdesign.report.lot.summary import LOT_SETTING, LotFirmware
 
 

@@ -13,7 +13,7 @@ from dzdesign.batch.runners import _in_processes
 from dzdesign.core.documents import MOST_DOCUMENT, read_recording
 from dzdesign.core.errors import InputError
 from dzdesign.core.processes import end_with
-from tests.support.many_valves import recordings
+from tests.support.many_valves import LOT_TOML, recordings
 
 #: What a start of Python, NumPy, joblib or CasADi imports.
 MODULES = ("json", "socket", "numpy", "joblib", "casadi", "msgspec", "sitecustomize", "encodings", "pickle", "typing")
@@ -46,7 +46,7 @@ def test_no_module_of_the_working_folder_is_imported(tmp_path):
         text = f"open({str(mark)!r}, 'a').write({name!r} + '\\n')\nraise SystemExit(3)\n"
         (tmp_path / f"{name}.py").write_text(text, encoding="utf-8")
     (tmp_path / "matplotlibrc").write_text("backend: module://socket\n", encoding="utf-8")
-    words = ["batch", "lot", "--jobs", "2", "--target", "host", "--meter-lag", "0.1 s", "-o", "out"]
+    words = ["batch", "lot", "--jobs", "2", "--target", "host", "--config", str(LOT_TOML), "-o", "out"]
     done = subprocess.run([DZDESIGN, *words], cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False)
     assert not mark.exists(), mark.read_text()
     assert done.returncode == 0 and (tmp_path / "out/valves.csv").is_file(), done.stderr

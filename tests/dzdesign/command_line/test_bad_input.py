@@ -218,7 +218,6 @@ def test_a_file_name_in_another_encoding(bench, capsys):
         "design nowhere.json",
         "codegen nowhere.json",
         "codegen compensator.json --target f28334",
-        "codegen valve.json -o new --law aim",
         "derive --format htm",
         "simulate --seed nan",
         "simulate --seed=-1",
@@ -274,7 +273,7 @@ def test_what_the_command_line_says_is_not_blamed_on_the_file(refusal, bench):
 
 
 def test_an_example_for_a_part_of_a_value_is_none_for_the_whole():
-    from dzdesign.command_line.options_file import in_words_of_the_file
+    from dzdesign.command_line.invocation import in_words_of_the_file
 
     values = {"ramp_up": "0.5 s / 0.8", "ramp": "1"}
     said = in_words_of_the_file("--ramp-up is '0.8' without a unit; write for example '0.8 s'", "dz.toml", values)
@@ -484,14 +483,14 @@ def test_a_compensator_whose_value_does_not_fit(refusal, bench, path, change, wo
 )
 def test_what_is_no_valve_at_all(refusal, bench, content, words):
     (bench / "bad.json").write_bytes(content)
-    for command in ("design", "codegen"):
-        line = refusal(command, "bad.json", "-o", "new")
-        assert "'bad.json'" in line
-        assert words.partition(", expected")[0] in line
+    line = refusal("design", "bad.json", "-o", "new")
+    assert "'bad.json'" in line
+    assert words.partition(", expected")[0] in line
 
 
 def test_every_artefact_in_the_place_of_another(refusal):
     assert "has the schema 'dzdesign.compensator/1', expected dzdesign.valve/1" in refusal("design", "compensator.json")
+    assert "which `dzdesign design` writes" in refusal("codegen", "valve.json", "-o", "new")
     assert "has the schema 'dzdesign.firmware/1'" in refusal("codegen", "firmware/manifest.json", "-o", "new")
     assert "is not JSON" in refusal("codegen", "firmware/core/dz_comp.c", "-o", "new")
 

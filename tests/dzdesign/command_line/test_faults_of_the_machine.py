@@ -42,23 +42,23 @@ def test_an_output_that_is_full(tmp_path, words):
 
 
 def test_a_full_output_names_what_was_written_before(tmp_path):
-    done = run("dz simulate --dp '1 MPa' -o ramps > /dev/full", tmp_path)
+    done = run("dz simulate --dp '1 MPa' --ramp-time '5 s' -o ramps > /dev/full", tmp_path)
     assert "written before that: 'ramps'" in sentence(done)
     assert (tmp_path / "ramps/manifest.json").is_file()
 
 
 def test_a_closed_output_is_said_before_any_work(tmp_path):
-    assert "closed" in sentence(run("dz simulate --dp '1 MPa' -o ramps >&-", tmp_path))
+    assert "closed" in sentence(run("dz simulate --dp '1 MPa' --ramp-time '5 s' -o ramps >&-", tmp_path))
     assert not list(tmp_path.iterdir())
 
 
 def test_a_closed_standard_error_says_nothing_and_does_the_work(tmp_path):
-    done = run("dz simulate --dp '1 MPa' -o ramps 2>&-", tmp_path)
+    done = run("dz simulate --dp '1 MPa' --ramp-time '5 s' -o ramps 2>&-", tmp_path)
     assert done.returncode == 0 and (tmp_path / "ramps/manifest.json").is_file()
 
 
 def test_a_full_standard_error_says_nothing_and_does_the_work(tmp_path):
-    done = run("dz simulate --dp '1 MPa' -o ramps 2>/dev/full", tmp_path)
+    done = run("dz simulate --dp '1 MPa' --ramp-time '5 s' -o ramps 2>/dev/full", tmp_path)
     assert done.returncode == 0 and (tmp_path / "ramps/manifest.json").is_file()
     assert run("dz design absent.json 2>/dev/full", tmp_path).returncode == 2
 
@@ -73,10 +73,8 @@ def test_an_interrupt_names_what_was_written_before(tmp_path, monkeypatch, capsy
     monkeypatch.setattr("signal.signal", lambda *_: None)
     assert main(["doctor"]) == 130
     said = capsys.readouterr().err
-    assert (
-        said
-        == f"dzdesign: interrupted; nothing half-written was left; written before that: '{tmp_path / 'valve.json'}'\n"
-    )
+    place = tmp_path / "valve.json"
+    assert said == f"dzdesign: interrupted; nothing half-written was left; written before that: '{place}'\n"
 
 
 @pytest.mark.parametrize(("blocks", "said"), [(0, "no folder for temporary files"), (8, "a temporary file can't be")])
@@ -94,7 +92,7 @@ def test_a_compiler_that_is_no_command(tmp_path):
 def test_a_working_folder_whose_name_is_not_utf_8(tmp_path):
     folder = os.fsencode(tmp_path) + b"/bad\xff"
     os.mkdir(folder)
-    done = run("dz simulate --dp '1 MPa' -o ramps", Path(os.fsdecode(folder)))
+    done = run("dz simulate --dp '1 MPa' --ramp-time '5 s' -o ramps", Path(os.fsdecode(folder)))
     assert done.returncode == 0, done.stderr
 
 

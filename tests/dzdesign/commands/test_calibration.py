@@ -178,8 +178,6 @@ def test_a_serial_number_that_steers_a_terminal_is_shown_as_blanks(written, bloc
         ["compensator.json"],
         ["compensator.json", "-o", "valve.s19"],
         ["compensator.json", "-o", "valve"],
-        ["compensator.json", "-o", "new.hex", "--format", "bin"],
-        ["compensator.json", "-o", "new.img", "--format", "hexx"],
         ["compensator.json", "-o", "new.bin", "--address", "0x330000"],
         ["compensator.json", "-o", "new.hex", "--address", "sector B"],
         ["compensator.json", "-o", "new.hex", "--address", "0x330001"],
@@ -196,8 +194,6 @@ def test_a_serial_number_that_steers_a_terminal_is_shown_as_blanks(written, bloc
         ["--read", "valve.hex", "--target", "f28335"],
         ["--read", "."],
         ["compensator.json", "-o", "new.hex", "--serial", "  "],
-        ["--read", "valve.bin", "--format", "hex"],
-        ["--read", "valve.hex", "--format", "txt"],
         ["--read", "nothing.hex"],
         ["--read", "compensator.json"],
         ["--read", "valve.hex", "valve.bin"],
@@ -235,15 +231,12 @@ def test_only_a_block_is_written_over(written, tmp_path, monkeypatch, capsys, un
     capsys.readouterr()
 
 
-def test_address_target_and_ending_can_be_chosen(written, tmp_path, capsys, unproven):
+def test_address_and_target_can_be_chosen(written, tmp_path, capsys, unproven):
     words = ["calibration", str(written / "compensator.json"), "--json"]
     for given, address in ((["--address", "0x320000"], 0x32_0000 * 2), (["--target", "host"], 0)):
         assert main([*words, "-o", str(tmp_path / "a.hex"), *given]) == 0
         assert min(hex_memory((tmp_path / "a.hex").read_text(), of_words=address > 0)) == address
         assert json.loads(capsys.readouterr().out)["address"] == (hex(address // 2) if address else "0x0")
-    assert main([*words, "-o", str(tmp_path / "a.image"), "--format", "hex", "--serial", "V-7"]) == 0
-    assert (tmp_path / "a.image").read_bytes() == (written / "valve.hex").read_bytes()
-    assert main(["calibration", "--read", str(tmp_path / "a.image"), "--format", "hex", "-q"]) == 0
 
 
 def test_an_options_file_for_all_commands_is_taken(written, tmp_path, capsys, unproven):
@@ -305,7 +298,7 @@ def test_the_page_is_in_the_units_of_the_recordings_where_the_compensator_is_kno
 def test_the_api_takes_the_options_of_the_command():
     options = {each.name for each in arguments_of_command("calibration")} - {"read"}
     assert set(inspect.signature(api.calibration).parameters) == options
-    assert set(inspect.signature(api.read_calibration).parameters) == {"file", "compensator", "format"}
+    assert set(inspect.signature(api.read_calibration).parameters) == {"file", "compensator"}
     for function in (api.calibration, api.read_calibration):
         assert re.search(r"\n\n *Raises\n *------\n", function.__doc__)
 

@@ -4,7 +4,6 @@ import json
 import shutil
 import stat
 import sys
-from importlib.metadata import version
 
 import pytest
 
@@ -30,8 +29,7 @@ def bare(tmp_path, monkeypatch):
 @needs_compiler
 def test_a_compiler_that_works_is_the_main_job(capsys):
     report = said(capsys, 0)
-    assert report["holds"] and report["compiles"] and shutil.which(report["compiler"])
-    assert report["packages"]["numpy"] == version("numpy")
+    assert report["compiles"] and shutil.which(report["compiler"])
     there = {name for name, found in report["programs"].items() if found}
     assert there & {"gcc", "clang", "zig"}
     assert there == {name for name in report["programs"] if shutil.which(name)} | (there & {"zig"})
@@ -59,13 +57,3 @@ def test_a_compiler_that_does_not_work_is_found_out(bare, capsys):
     report = said(capsys, 1)
     assert report["programs"]["gcc"]["version"] == "99.1.2" and not report["compiles"]
     assert "does not compile" in report["compiler"]
-
-
-@pytest.mark.slow
-def test_a_missing_package_is_named(monkeypatch, capsys):
-    known = doctor._version
-    monkeypatch.setattr(doctor, "_version", lambda package: None if package == "polars" else known(package))
-    assert said(capsys, 1)["packages"]["polars"] is None
-    assert main(["doctor"]) == 1
-    page = capsys.readouterr().out
-    assert "polars MISSING" in page and "-m pip install polars" in page

@@ -17,9 +17,17 @@ import numpy as np
 import pytest
 import serial
 
-from dzdesign.codegen.telemetry.frame import FRAME_OCTETS, STATUS_BITS, STATUS_CALIBRATION, STATUS_RELEASED, Frame
+from dzdesign.codegen.telemetry.frame import (
+    FRAME_OCTETS,
+    STATUS_BITS,
+    STATUS_CALIBRATION,
+    STATUS_RELEASED,
+    Frame,
+    FrameReader,
+)
 from dzdesign.codegen.telemetry.recording import COLUMNS, Recording, recording_file, scalings_of
-from dzdesign.commands.monitor import _other_firmware
+from dzdesign.command_line.cli import main
+from dzdesign.commands.monitor import _nothing, _other_firmware
 from dzdesign.core.documents import sha256_of, to_json
 from dzdesign.core.errors import InputError
 from dzdesign.identify.reading.ramp_files import read_ramp_file
@@ -287,7 +295,7 @@ def test_a_full_disk_leaves_whole_lines(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_two_monitors_do_not_share_a_file(bench):
+def test_two_monitors_do_not_share_a_file(bench, refused):
     bench.listen()
     master, slave = os.openpty()
     try:
@@ -370,25 +378,31 @@ def test_a_drive_without_a_valid_block_is_no_other_firmware(firmware_folder):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("lines", "said"), [([], "nothing"), (["raw " + "00ff" * 40], "check --baud"), (["raw a55a0207"], "one version")]
-)
-def test_a_line_without_frames_is_status_2_and_leaves_no_file(bench, lines, said):
+def test_a_line_without_frames_is_status_2_and_leaves_no_file(bench):
     bench.listen("--seconds", "0.1")
-    if lines:
-        bench.send(lines)
     status, _, words = bench.end()
-    assert status == 2 and said in words and list(bench.folder.iterdir()) == []
+    assert status == 2 and "nothing" in words and list(bench.folder.iterdir()) == []
 
 
-def refused(*words: str | Path) -> str:
-    done = subprocess.run([PROGRAM, "monitor", *words], capture_output=True, text=True, check=False)
-    assert done.returncode == 2 and done.stderr.count("\n") == 1 and done.stdout == "", done.stderr
-    return done.stderr
+@pytest.mark.parametrize(("octets", "said"), [("00ff" * 40, "check --baud"), ("a55a0207", "one version")])
+def test_a_line_with_something_else_on_it_says_what_to_check(octets, said):
+    reader = FrameReader()
+    assert list(reader.feed(bytes.fromhex(octets))) == []
+    assert said in str(_nothing("COM5", 115200, reader))
 
 
-@pytest.mark.slow
-def test_a_bad_port_option_or_place_is_one_sentence(bench):
+@pytest.fixture
+def refused(capsys):
+    def refused(*words: str | Path) -> str:
+        assert main(["monitor", *map(str, words)]) == 2
+        out, err = capsys.readouterr()
+        assert err.count("\n") == 1 and out == "", err
+        return err
+
+    return refused
+
+
+def test_a_bad_port_option_or_place_is_one_sentence(bench, refused):
     port, output = os.ttyname(bench.slave), ["-o", bench.output]
     firmware = ["--firmware", bench.firmware]
     assert "can't be opened" in refused("/dev/no-such-port", *firmware, *output)
@@ -402,7 +416,7 @@ def test_a_bad_port_option_or_place_is_one_sentence(bench):
 
 
 @pytest.mark.slow
-def test_a_port_in_use_is_refused(bench):
+def test_a_port_in_use_is_refused(bench, refused):
     bench.listen()
     other = bench.folder / "other.csv"
     assert "can't be opened" in refused(os.ttyname(bench.slave), "--firmware", bench.firmware, "-o", other)

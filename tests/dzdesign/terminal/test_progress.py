@@ -1,4 +1,4 @@
-"""The bar: on a terminal, on stderr, and gone afterwards; nothing anywhere else."""
+"""The bar is gone when its work has ended; for whom it is shown is in tests/dzdesign/command_line."""
 
 import io
 import sys
@@ -6,7 +6,6 @@ import time
 
 import pytest
 
-from dzdesign.terminal import progress
 from dzdesign.terminal.progress import with_bar
 
 
@@ -19,24 +18,6 @@ def until_seen(stream, text):
     until = time.monotonic() + 5
     while text not in stream.getvalue() and time.monotonic() < until:
         time.sleep(0.005)
-
-
-@pytest.mark.parametrize(
-    ("terminal", "quiet", "seen"), [(True, False, True), (True, True, False), (False, False, False)]
-)
-def test_a_bar_only_for_a_person_who_watches(monkeypatch, terminal, quiet, seen):
-    stream = Terminal() if terminal else io.StringIO()
-    monkeypatch.setattr(sys, "stderr", stream)
-    monkeypatch.setattr(progress._Verbosity, "quiet", quiet)
-    monkeypatch.setenv("TERM", "xterm")
-    items = []
-    for item in with_bar(range(9), "reading ramp tests"):
-        items.append(item)
-        if seen:
-            until_seen(stream, "reading ramp tests")
-    assert items == list(range(9))
-    assert ("reading ramp tests" in stream.getvalue()) == seen
-    assert seen or stream.getvalue() == ""
 
 
 def test_the_bar_is_gone_when_the_work_fails(monkeypatch):

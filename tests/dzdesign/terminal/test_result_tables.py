@@ -16,9 +16,9 @@ from dzdesign.design.designing import design
 from dzdesign.design.options import options_of
 from dzdesign.report.lot.summary import FailedValve, LotSummary
 from dzdesign.terminal.design_tables import print_compensator
+from dzdesign.terminal.evidence_tables import print_loop
 from dzdesign.terminal.page import new_console
 from dzdesign.terminal.tables import gains_most, print_valve
-from dzdesign.terminal.verification_tables import print_loop
 from dzdesign.verify.loop_results import ScenarioResult
 from tests.support.evidence import pressure_result
 

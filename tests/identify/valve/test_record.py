@@ -157,7 +157,8 @@ def test_each_valve_of_a_list_has_its_own_beside_that_of_all(here, wording):
     from dzdesign.command_line.invocation import parse
 
     Path("lot.csv").write_text("name,files,record.serial,record.oil-type\na,ramp.csv,4711,\nb,ramp.csv,4712,HLP 32\n")
-    args = parse(["batch", "lot.csv", "--record", "bench = 2", "--record", "oil-type = HLP 46"]).arguments
+    Path("options.toml").write_text('[record]\nbench = "2"\noil-type = "HLP 46"\n')
+    args = parse(["batch", "lot.csv", "--config", "options.toml"]).arguments
     tasks = [_task(valve, args, None, ()) for valve in valves_of(Path("lot.csv"), None, ())]
     assert [task.identify.record for task in tasks] == [
         {"bench": "2", "oil-type": "HLP 46", "serial": "4711"},

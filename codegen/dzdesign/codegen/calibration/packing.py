@@ -213,7 +213,7 @@ def _no_format(path: Path) -> str:
     if path.is_dir():
         return f"'{path}' is a folder, {expected}; name the file in it"
     ending = f"ends with '{path.suffix}'{nearest(path.suffix, known)}" if path.suffix else "has no ending"
-    return f"'{path}' {ending}, {expected}; rename it, or with --read say --format"
+    return f"'{path}' {ending}, {expected}; rename it"
 
 
 def _intel_hex(content: bytes, name: str) -> tuple[bytes, Place]:

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dzdesign.assess.limits import LIMITED, LimitResult
 from dzdesign.assess.options import SETS
-from dzdesign.assess.quantities import LOSS, QUANTITIES
+from dzdesign.assess.quantities import LIMITED, LOSS, QUANTITIES, LimitResult
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.identify.plots.style import CYCLE
 from dzdesign.report.figure import LIGHT, ReportFigure, csv_text, label_ends, legend_below, new_figure, to_report_figure

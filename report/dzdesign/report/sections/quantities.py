@@ -11,12 +11,10 @@ from typing import Literal
 import numpy as np
 from msgspec import UnsetType
 
-from dzdesign.assess.assessment import Assessment, PressureAssessment
-from dzdesign.assess.limits import LimitResult
-from dzdesign.assess.measured_curves import MeasuredCurve
+from dzdesign.assess.assessment import Assessment, MeasuredCurve, PressureAssessment
 from dzdesign.assess.options import SETS, Set
-from dzdesign.assess.quantities import LOSS
-from dzdesign.assess.thinned_curves import Line, gain_of, hysteresis_of, linearity_of
+from dzdesign.assess.quantities import LOSS, LimitResult
+from dzdesign.assess.readings import Line, gain_of, hysteresis_of, linearity_of
 from dzdesign.identify.ramps.pooling import SAME_PRESSURE
 from dzdesign.identify.valve.model import SIDES, ValveModel
 from dzdesign.identify.valve.ramp_result import TestResult

@@ -1,0 +1,272 @@
+"""A verification, an assessment and a reproduction as tables on stdout."""
+
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from dzdesign.core.display import DOES_NOT_HOLD, NOT_ASKED_FOR, NOT_REQUIRED, verdict_words
+from dzdesign.core.recorded_units import AS_COMPUTED
+from dzdesign.terminal.page import Column, new_console, put_facts, put_line, put_rows
+from dzdesign.terminal.tables import meter_line, put_units
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from dzdesign.assess.assessment import Assessment, PressureAssessment
+    from dzdesign.core.recorded_units import RecordedUnits
+    from dzdesign.identify.valve.model import ValveModel
+    from dzdesign.reproduce.artefact import PaperNumber, Reproduction
+    from dzdesign.verify.evidence import Evidence
+    from dzdesign.verify.loop_results import ScenarioResult
+    from dzdesign.verify.outputs.verification import OutputVerification
+    from dzdesign.verify.verification import Verification
+
+def print_result(verification: "Verification | OutputVerification") -> None:
+    """Print a verification of a C firmware, or of another output."""
+    from dzdesign.verify.verification import Verification
+
+    if isinstance(verification, Verification):
+        print_verification(verification)
+    else:
+        print_output_verification(verification)
+
+
+def print_verification(verification: "Verification", console: "Console | None" = None) -> None:
+    """Print every check, what was not tried, and the closed loop per pressure drop."""
+    from dzdesign.verify.verification import label_of_untried, untried_requirements
+
+    console = console or new_console()
+    for check in verification.evidence.checks:
+        put_line(console, f"{verdict_words(check.holds)}  {check.name}: {check.text}")
+        for found in check.not_required:
+            put_line(console, f"{NOT_REQUIRED}  {found}")
+    for each in untried_requirements(verification.evidence):
+        put_line(console, f"{label_of_untried(each)}  {each.title}: {each.how}".replace("`", ""))
+    units = verification.derived.valve.recorded_units if verification.derived else AS_COMPUTED
+    print_loop(verification.evidence, console, units)
+    put_line(console, verification.verdict)
+
+
+def print_output_verification(verification: "OutputVerification", console: "Console | None" = None) -> None:
+    """Print every check of an output other than a C firmware, and what was not tried."""
+    from dzdesign.verify.requirements import RAMPS
+
+    console = console or new_console()
+    for check in verification.evidence.checks:
+        put_line(console, f"{verdict_words(check.holds)}  {check.name}: {check.text}")
+    if not any(check.id == RAMPS.id for check in verification.evidence.checks):
+        put_line(console, f"{NOT_ASKED_FOR}  {RAMPS.title}: {RAMPS.how}".replace("`", ""))
+    put_line(console, verification.verdict)
+
+
+def print_loop(evidence: "Evidence", console: "Console", units: "RecordedUnits" = AS_COMPUTED) -> None:
+    """Print the tables of the closed loop, and what else was read in its scenarios."""
+    from dzdesign.report.sections.closed_loop import facts, worst_of_each
+
+    if evidence.closed_loop.pressures:
+        backs = ", ".join(units.text(each, ".2f MPa") for each in evidence.closed_loop.back_MPa)
+        plant = f"the simulated valve ({evidence.closed_loop.plant_source})"
+        behind = f"pressure behind the edge: {backs}; ramps at the highest, failing sensors at each"
+        put_line(console, f"Closed loop: the C code with {plant}; {behind}.")
+    put_facts(console, *facts(evidence, units))
+    for each in worst_of_each(evidence.scenarios):  # words of many lines in a narrow column are not a table
+        if each.figures:
+            put_line(console, f"{each.name}: {_figures(each, units)}")
+
+
+#: How a figure's name begins -> of which valve it is; and how it ends -> its unit.
+VALVES = {"compensated_": "with the compensator ", "direct_": "without it ", "": ""}
+UNITS = {"_L_min": "L/min", "_MPa": "MPa", "_ms": "ms", "_mL": "mL", "_percent": "%", "": ""}
+#: Those in which a valve may be recorded otherwise.
+RECORDED = ("L/min", "MPa")
+
+
+def _figures(result: "ScenarioResult", units: "RecordedUnits") -> str:
+    """Return figures as words, those of one valve together: rise_ms is a rise in ms."""
+    figures, unseen = result.figures, result.unseen_below_L_min
+    groups: dict[str, list[str]] = {start: [] for start in VALVES}
+    for key, value in figures.items():
+        start, end = next(filter(key.startswith, VALVES)), next(filter(key.endswith, UNITS))
+        name = key.removeprefix(start).removesuffix(end).replace("_", " ")
+        # A change of flow may well be small; a flow that the recordings can't show is no small one.
+        hidden = unseen is not None and name.endswith("flow") and value < unseen
+        unit = UNITS[end]
+        number = units.number(value, f".3g {unit}") if unit in RECORDED else f"{value:.3g}"
+        number = result.in_words(value, units) if hidden else number
+        groups[start].append(f"{name} {number} {units.label(unit) if unit in RECORDED else unit}".rstrip())
+    return "; ".join(VALVES[start] + ", ".join(each) for start, each in groups.items() if each)
+
+
+def print_demo(valve: "ValveModel", verification: "Verification", folder: str) -> None:
+    """Print what the demo ends with: the dead zones and flows of the closed loop, and what was checked."""
+    from dzdesign.report.sections.closed_loop import loops_table, readings_table
+
+    console, pressures = new_console(), verification.evidence.closed_loop.pressures
+    put_line(console, "Simulated example valve, 0-10 V ramps in closed loop with the generated C.")
+    put_facts(console, loops_table(pressures, AS_COMPUTED), readings_table(pressures, AS_COMPUTED))
+    put_line(
+        console,
+        "β (beta): change of the threshold with the pressure drop, which the firmware applies to its offset. Without "
+        f"it the offset stays that of {valve.positive.reference.dp_MPa:g} MPa, and flow passes at zero command where "
+        "the threshold is lower.",
+    )
+    checked, wrong = (sum(getattr(each, name) for each in verification.evidence.inputs) for name in ("inputs", "wrong"))
+    put_line(console, f"Inputs checked: {checked}, wrong: {wrong}")
+    put_line(console, verification.verdict)
+    put_line(console, f"Open first: {folder}/evidence/report.html")
+
+
+def print_assessment(assessment: "Assessment") -> None:
+    """Print each quantity before and after, what is not observable and why, notes and limits."""
+    from dzdesign.identify.valve.model import lag_in_words
+    from dzdesign.report.sections.characteristic import characteristic_section
+    from dzdesign.report.sections.quantities import characteristic_quantities
+
+    page, units, meter = new_console(), assessment.recorded_units, assessment.meter
+    shown = replace(assessment, pressures=tuple(_shown_pressures(assessment)) or assessment.pressures)
+    section = characteristic_section(characteristic_quantities(None, shown, (), ()), units)
+    put_facts(page, *section.tables)
+    lines = [
+        *section.lines,
+        *_ideal_line(assessment),
+        *_not_observable(assessment),
+        *_remarks(assessment),
+        meter_line(meter.floor_L_min, lag_in_words(meter.lag_s, meter.lag_is), units),
+        *(f"note [{each.code}] {f'{each.source}: ' if each.source else ''}{each.text}" for each in assessment.notes),
+        *_limits(assessment),
+    ]
+    for line in lines:
+        put_line(page, line)
+    put_units(page, units, "assessment.json")
+
+
+def _ideal_line(assessment: "Assessment") -> list[str]:
+    """Return what a straight line from zero to the largest flow would read at the reading flow."""
+    read = [
+        f"{found.value:.2f} % ({item.place(assessment.recorded_units)})"
+        for item in _shown_pressures(assessment)
+        if (found := item.quantities["ideal_line"].after) and found.value is not None
+    ]
+    return [f"At the reading flow an ideal line from zero reads {', '.join(read)}."] if read else []
+
+
+def _not_observable(assessment: "Assessment") -> list[str]:
+    """Return a sentence for each reason why something is not observable, with all pressure drops that it holds for."""
+    from dzdesign.assess.options import SETS
+    from dzdesign.assess.quantities import QUANTITIES
+
+    units = assessment.recorded_units
+    reasons: dict[tuple[str, str], dict[str, list[str]]] = {}
+    for item in _shown_pressures(assessment):
+        for name in SETS:
+            for key, reading in item.readings(name).items():
+                if reading.value is None and not (key == "symmetry" and _one_sided(assessment)):
+                    places = reasons.setdefault((QUANTITIES[key].name, reading.not_observable or ""), {})
+                    where = "unknown" if item.dp_MPa is None else units.number(item.dp_MPa, ".2f MPa")
+                    side = "" if _one_sided(assessment) else f", {item.side} commands"
+                    places.setdefault(name.upper() + side, []).append(where)
+    together: dict[tuple[str, str], list[str]] = {}
+    for (quantity, reason), places in reasons.items():
+        where = " and ".join(f"{name} at {', '.join(dp)} {units.label('MPa')}" for name, dp in places.items())
+        together.setdefault((where, reason), []).append(quantity)
+    return [
+        f"not observable: {'; '.join(quantities)}: {where}, because {reason}"
+        for (where, reason), quantities in together.items()
+    ]
+
+
+def _remarks(assessment: "Assessment") -> list[str]:
+    """Return what must be known beside the values."""
+    from dzdesign.assess.options import SETS
+    from dzdesign.assess.quantities import QUANTITIES
+
+    return [
+        f"{QUANTITIES[key].name}, {name.upper()} at {item.place(assessment.recorded_units)}: {reading.note}"
+        for item in _shown_pressures(assessment)
+        for name in SETS
+        for key, reading in item.readings(name).items()
+        if reading.note
+    ]
+
+
+def _shown_pressures(assessment: "Assessment") -> list["PressureAssessment"]:
+    """Return those with a recording with the compensator: of the others there is a note, and all in the JSON."""
+    return [item for item in assessment.pressures if item.after]
+
+
+def _one_sided(assessment: "Assessment") -> bool:
+    return len({item.side for item in assessment.pressures}) == 1
+
+
+def _limits(assessment: "Assessment") -> list[str]:
+    """Return a line for each limit and recording, the verdict first."""
+    from dzdesign.assess.quantities import LIMITED
+
+    if not assessment.limits:
+        return ["No limits were given (--limits, or [limits] in the file of options): nothing was required."]
+    lines = [
+        f"{verdict_words(result.holds)}  {LIMITED[result.quantity].name}, {result.place}: {result.text}"
+        for result in assessment.limits
+    ]
+    bad = sum(not result.holds for result in assessment.limits)
+    verdict = f"{DOES_NOT_HOLD}: {bad} of {len(lines)} limits are exceeded or could not be checked"
+    return [*lines, verdict if bad else "Every limit holds."]
+
+
+AGREES, MISSED, UNEXPLAINED = "agrees", "MISSED", "MISSED, NOBODY KNOWS WHY"
+
+
+def print_reproduction(reproduction: "Reproduction") -> None:
+    """Print the paper's numbers beside ours, valve by valve, and the reasons."""
+    console = new_console()
+    notes: dict[str, int] = {}
+
+    def verdict(item: "PaperNumber") -> str:
+        texts = filter(None, (item.reason, item.why))
+        return f"{verdict_of(item)} {''.join(f'[{notes.setdefault(each, len(notes) + 1)}]' for each in texts)}".strip()
+
+    columns: dict[str, Column[PaperNumber]] = {
+        "": lambda item: item.quantity,
+        "MPa": lambda item: "" if item.dp_MPa is None else f"{item.dp_MPa:g}",
+        "paper": with_unit,
+        "ours": lambda item: f"{item.value:.2f}",
+        "of": lambda item: item.by,
+        "ideal line": lambda item: "" if item.ideal_line is None else f"{item.ideal_line:.2f}",
+        "verdict": verdict,
+    }
+    for valve in reproduction.valves:
+        of_valve = [item for item in reproduction.numbers if item.valve == valve.valve]
+        read = f"; dead zones read at {valve.level_L_min:g} L/min" if valve.level_L_min else ""
+        put_rows(console, f"The paper's numbers and ours: {valve.valve}{read}", of_valve, columns, words=(0, 4, 6))
+    for note, number in notes.items():
+        put_line(console, f"[{number}] {note}")
+    put_line(console, f"Assumed, as the paper does not say it: {'; '.join(reproduction.assumptions)}")
+    for line in summary(reproduction):
+        put_line(console, line)
+
+
+def summary(reproduction: "Reproduction") -> list[str]:
+    """Return how many numbers are of which kind, and how many of the predicted ones agree."""
+    numbers = reproduction.numbers
+    predicted = [item.agrees for item in numbers if item.kind == "predicted"]
+    kinds = {kind: sum(item.kind == kind for item in numbers) for kind in ("fitted", "predicted")}
+    unknown = sum(not item.holds for item in numbers)
+    return [
+        f"{len(numbers)} numbers: " + ", ".join(f"{count} {kind}" for kind, count in kinds.items()) + ".",
+        f"Of {len(predicted)} predicted {predicted.count(True)} agree and {predicted.count(False)} are missed.",
+        f"{unknown} MISSED FOR NO REASON THAT REACHES SO FAR." if unknown else "Every miss has its reason.",
+    ]
+
+
+def with_unit(item: "PaperNumber") -> str:
+    """Return a printed number with its unit; words have none."""
+    return f"{item.published} {item.unit}" if item.published[0].isdigit() else item.published
+
+
+def verdict_of(item: "PaperNumber") -> str:
+    """Return what became of a number: nothing that was fitted agrees."""
+    if not item.holds:
+        return UNEXPLAINED
+    if item.kind != "predicted":
+        return item.kind
+    return AGREES if item.agrees else MISSED
