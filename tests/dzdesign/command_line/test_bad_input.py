@@ -90,7 +90,7 @@ def refusal(bench, capsys):
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (b"", "is empty; expected a header row"),
+        (b"", "is empty, comments and blank lines apart"),
         (csv(ramp()).partition("\n")[2].encode(), "has no header row"),
         (csv(ramp(), "time,u,dP,Q").encode(), "column 'time' has no unit"),
         (csv(ramp(), "time_s,u_V,dP_xyz,Q_Lmin").encode(), "column 'dP_xyz': 'xyz' is not a unit of pressure"),
@@ -106,8 +106,8 @@ def refusal(bench, capsys):
         ((csv(ramp()) + "1,2,3,4,5\n").encode(), "row 1002 has 5 cells, expected 4"),
         (gzip.compress(csv(ramp()).encode(), mtime=0)[:-9], "is not a whole gzip file"),
         (gzip.compress(csv(ramp()).encode(), mtime=0)[:99] + b"\0" * 9, "is not a whole gzip file"),
-        (csv(ramp()).encode("utf-16-le"), "is UTF-16 without a byte order mark"),
-        (b"# 40 \x90C\n" + csv(ramp()).encode(), "is not a text file, neither in UTF-8 nor in Windows-1252"),
+        (csv(ramp()).encode("utf-16-le"), "is not a text file"),
+        (b"# 40 \x90C\n" + csv(ramp()).encode(), "is not a text file"),
         (csv(ramp() * [1, 1, 1, 0]).encode(), "does not show the valve opening"),
         (csv(ramp() * [1, 0, 1, 1]).encode(), "holds no ramp of the command"),
         (csv(ramp() * [1, 1, -1, 1]).encode(), "swap pA and pB"),

@@ -22,7 +22,6 @@ PRESSURES: tuple[str, ...] = ("dP", *PORTS)
 QUANTITY_OF_COLUMN = {"time": "time", "u": "voltage", **dict.fromkeys(PRESSURES, "pressure"), "Q": "flow"}
 #: How a column is best named, for the messages.
 EXAMPLE_UNITS = {"time": "s", "u": "V", **dict.fromkeys(PRESSURES, "MPa"), "Q": "L/min"}
-EXAMPLE_LABELS = {name: f"{name}_{unit.replace('/', '')}" for name, unit in EXAMPLE_UNITS.items()}
 #: Labels among which the one that was meant is looked for.
 MOST_MEANT = 200
 #: Units of a command that is a share of u_max.
