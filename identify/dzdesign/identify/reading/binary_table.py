@@ -55,20 +55,13 @@ FEW = {"POLARS_MAX_THREADS": "2", "OPENBLAS_NUM_THREADS": "1", "MALLOC_ARENA_MAX
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ArrayTable(Table):
-    """A table whose columns are arrays.
+    """A table whose columns are arrays."""
 
-    Attributes
-    ----------
-    file : binary file
-        Open as long as columns are loaded.
-    file_format : FileFormat
-        Of the file.
-    columns : mapping
-        Label -> number of the column in the file, and what the file says of it.
-    """
-
+    #: Open as long as columns are loaded.
     file: BinaryIO
+    #: Of the file.
     file_format: FileFormat
+    #: Label -> number of the column in the file, and what the file says of it.
     columns: Mapping[str, tuple[int, FileColumn]]
     _loaded: dict[str, np.ndarray] = field(default_factory=dict)
 

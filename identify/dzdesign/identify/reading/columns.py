@@ -277,33 +277,22 @@ def _without_time(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProposedColumns:
-    """How the columns of a recording may be read.
+    """How the columns of a recording may be read."""
 
-    Attributes
-    ----------
-    labels : tuple of str
-        All of the file's.
-    known : dict
-        Quantity -> column that its label, or the engineer, says to be it.
-    proposed : dict
-        Quantity -> column that is the only one it can be, by its unit.
-    unclear : dict
-        Quantity -> why it could not be told.
-    pressures : dict
-        Columns that may make the pressure drop, for a person to say which is which: label -> unit, "" if it has none.
-    command_range : str
-        Column of an unclear command with the range of its numbers, ``duty:0..0.9 = 0..100 %``, for a person to correct;
-        or of two columns that may drive a solenoid each the difference, ``uA_V - uB_V``.
-    times : tuple
-        Labels of the columns that are a time.
-    """
-
+    #: All of the file's.
     labels: tuple[str, ...]
+    #: Quantity -> column that its label, or the engineer, says to be it.
     known: dict[str, Column]
+    #: Quantity -> column that is the only one it can be, by its unit.
     proposed: dict[str, Column]
+    #: Quantity -> why it could not be told.
     unclear: dict[str, str]
+    #: Columns that may make the pressure drop, for a person to say which is which: label -> unit, "" if it has none.
     pressures: dict[str, str]
+    #: Column of an unclear command with the range of its numbers, ``duty:0..0.9 = 0..100 %``, for a person to correct;
+    #: or of two columns that may drive a solenoid each the difference, ``uA_V - uB_V``.
     command_range: str = ""
+    #: Labels of the columns that are a time.
     times: tuple[str, ...] = ()
 
     def option(self, *, time_is_declared: bool) -> str:

@@ -90,23 +90,15 @@ def read_ramp_file(
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Channels:
-    """The columns of a recording as they were found and read.
+    """The columns of a recording as they were found and read."""
 
-    Attributes
-    ----------
-    data : dict
-        Quantity -> samples in SI, NaN where one is missing.
-    scalings : dict
-        Quantity -> what turned them into SI, the time apart.
-    missing : dict
-        Label -> what stood there for no value.
-    clock : Clock or None
-        The time; None where the sample rate is declared.
-    """
-
+    #: Quantity -> samples in SI, NaN where one is missing.
     data: dict[str, np.ndarray]
+    #: Quantity -> what turned them into SI, the time apart.
     scalings: dict[str, Scaling]
+    #: Label -> what stood there for no value.
     missing: dict[str, Missing]
+    #: The time; None where the sample rate is declared.
     clock: Clock | None
 
 

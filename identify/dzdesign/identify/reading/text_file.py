@@ -301,8 +301,8 @@ def _wrong_row(cells: Sequence[str], number: int, header: Header, path: Path) ->
 
 
 # Blocks of words per channel or segment: LabVIEW measurement files (.lvm), TwinCAT Scope's CSV. They are made comments,
-# which keeps the numbers of the lines, and one row of labels stays. What they say of units and times goes into the table:
-# a LabVIEW file may state only start and step of each channel, for each segment anew.
+# which keeps the numbers of the lines, and one row of labels stays. What they say of units and times goes into the
+# table: a LabVIEW file may state only start and step of each channel, for each segment anew.
 
 
 @final

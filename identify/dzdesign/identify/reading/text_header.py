@@ -68,29 +68,19 @@ class Line:
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Header:
-    """The header row.
+    """The header row."""
 
-    Attributes
-    ----------
-    line : int
-        Its number in the file.
-    labels : tuple of str
-        Of the columns.
-    separator : str
-        What stands between two cells.
-    units : mapping
-        Label -> unit, by a row of units beside it.
-    repeats : frozenset of str
-        The header's line and that of the units: where they stand once more, they are no samples.
-    rows : int
-        Place of the first line below it, words and units aside.
-    """
-
+    #: Its number in the file.
     line: int
+    #: Of the columns.
     labels: tuple[str, ...]
+    #: What stands between two cells.
     separator: str
+    #: Label -> unit, by a row of units beside it.
     units: Mapping[str, str]
+    #: The header's line and that of the units: where they stand once more, they are no samples.
     repeats: frozenset[str]
+    #: Place of the first line below it, words and units aside.
     rows: int
 
 

@@ -60,27 +60,18 @@ ADVICE = "export numbers with one mark and no separator of thousands"
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TextTable(Table):
-    """A table of text: its cells as they stand in the file, and where they stand in it.
+    """A table of text: its cells as they stand in the file, and where they stand in it."""
 
-    Attributes
-    ----------
-    cells : DataFrame
-        A column of texts for each label, in their order; of numbers where a header states times by start and step, and
-        where they were read.
-    header_line : int
-        Number of the header's line.
-    lines : (N,) array of int
-        Numbers of the rows' lines.
-    starts : mapping
-        Label of a column of time -> date and time at which it counts zero, where a header states it.
-    missing : collection of str
-        What stands for no value by the engineer's word.
-    """
-
+    #: A column of texts for each label, in their order; of numbers where a header states times by start and step, and
+    #: where they were read.
     cells: "pl.DataFrame"
+    #: Number of the header's line.
     header_line: int
+    #: Numbers of the rows' lines; (N,).
     lines: np.ndarray
+    #: Label of a column of time -> date and time at which it counts zero, where a header states it.
     starts: Mapping[str, str] = field(default_factory=dict)
+    #: What stands for no value by the engineer's word.
     missing: Collection[str] = ()
     #: What columns that were read have shown: label -> decimal mark, a cell that shows it; and label -> mark that may
     #: be one between thousands, a cell with it, where that stands.
