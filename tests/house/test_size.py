@@ -13,7 +13,7 @@ from tests.support.paths import ROOT
 ROOM_SIZES = {
     "core": (2505, 15, 0),
     "derivation": (4704, 28, 325),
-    "identify": (16951, 122, 1064),
+    "identify": (16901, 122, 1064),
     "assess": (1687, 13, 0),
     "design": (6662, 30, 0),
     "codegen": (7422, 50, 7308),

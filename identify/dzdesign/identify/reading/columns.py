@@ -36,7 +36,6 @@ from dzdesign.identify.reading.column_labels import (
 )
 from dzdesign.identify.reading.metering_edge import (
     PORTS,
-    MeteringEdge,
     gauge_beside_absolute,
     metering_edge,
     which_edge,
@@ -77,7 +76,12 @@ def find_columns(table: Table, chosen: Mapping[str, str], sample_rate: float | N
     clocks = ClockColumns(table)
     columns = _labelled(table, chosen, clocks)
     if sample_rate is not None:
-        columns = _without_time(table, columns, clocks, sample_rate)
+        time = columns.pop("time", None)
+        if len(clocks.labels) > 1 or (time is not None and fits(time.unit, "time")):
+            raise InputError(
+                f"'{table.path}' has a column of time ('{time.label if time else clocks.labels[0]}'), and "
+                f"--sample-rate declares {sample_rate:g} Hz too; leave one of them out"
+            )
     edge = metering_edge(columns)
     if edge.ambiguous:
         labels = {quantity: column.label for quantity, column in columns.items()}
@@ -254,24 +258,6 @@ def _with_own_clocks(table: Table, columns: dict[str, Column], clocks: ClockColu
     return columns
 
 
-def _without_time(
-    table: Table, columns: dict[str, Column], clocks: ClockColumns, sample_rate: float
-) -> dict[str, Column]:
-    """Return columns without one of time whose unit nobody knows; refuse a clock."""
-    time, times = columns.get("time"), clocks.labels
-    if len(times) > 1:
-        raise InputError(
-            f"'{table.path}' has columns of time ('{times[0]}', '{times[1]}'), and --sample-rate declares "
-            f"{sample_rate:g} Hz too; leave it out"
-        )
-    if time is not None and fits(time.unit, "time"):
-        raise InputError(
-            f"'{table.path}' has a column of time ('{time.label}'), and --sample-rate declares {sample_rate:g} Hz too; "
-            "leave one of them out"
-        )
-    return {quantity: column for quantity, column in columns.items() if quantity != "time"}
-
-
 # for a person to declare
 
 
@@ -359,7 +345,10 @@ def _proposed(
 ) -> ProposedColumns:
     known, times = _labelled(table, chosen, clocks), clocks.labels
     edge = metering_edge(known)
-    known = {name: column for name, column in known.items() if not _is_unused(name, column, edge)}
+    # A pressure beside the edge's, or a supply's without a unit, is none that the reader takes.
+    bare = {name for name in ("pP", "pT") if name in known and not known[name].unit and not edge.ambiguous}
+    unused = bare | (set(PRESSURES) - set(edge.quantities) if edge.quantities else set())
+    known = {name: column for name, column in known.items() if name not in unused}
     unclear = {name: why for name, column in known.items() if (why := _why_unreadable(table.path, name, column))}
     taken = {column.label for column in known.values()}
     proposed: dict[str, Column] = {}
@@ -387,8 +376,11 @@ def _proposed(
         del unclear["time"]
     elif "time" in unclear and u is None and len(times) > 1:
         unclear["time"] += "; that of the command is taken as soon as u is known"
-    command_range = _command_range(table, known, taken) if "u" in unclear else ""
-    command_range = (_two_solenoids(table, known, taken) if "u" in unclear else "") or command_range
+    command_range = _two_solenoids(table, known, taken) if "u" in unclear else ""
+    if "u" in unclear and not command_range:  # one without a unit, or the only one that is named like a duty cycle
+        labels = [known["u"].label] if "u" in known and not known["u"].unit else []
+        labels = labels or [label for label in table.labels if label not in taken and DUTY_LIKE.search(label)]
+        command_range = _range_of(table, labels[0]) if len(labels) == 1 and labels[0] else ""
     drop = {column.label for name, column in proposed.items() if name == "dP"}
     pressures = {} if edge.quantities else _pressures(table, known, taken - drop)
     if command_range:
@@ -412,13 +404,6 @@ def _pressures(table: Table, known: Mapping[str, Column], taken: set[str]) -> di
         elif not table.units.get(label) and PRESSURE_LIKE.fullmatch(label):
             found.setdefault(label, "")
     return found
-
-
-def _command_range(table: Table, known: Mapping[str, Column], taken: set[str]) -> str:
-    """Return the range form of a command without a unit, or of the only column that is named like a duty cycle."""
-    labels = [known["u"].label] if "u" in known and not known["u"].unit else []
-    labels = labels or [label for label in table.labels if label not in taken and DUTY_LIKE.search(label)]
-    return _range_of(table, labels[0]) if len(labels) == 1 and labels[0] else ""
 
 
 def _two_solenoids(table: Table, known: Mapping[str, Column], taken: set[str]) -> str:
@@ -462,12 +447,6 @@ def _range_of(table: Table, label: str) -> str:
     top = f"{highest:.3g}" if highest < 1000 else f"{highest:.0f}"
     both = bool(lowest < -0.5 * highest)
     return f"{label}:{f'-{top}' if both else '0'}..{top} = {'-100' if both else '0'}..100 %"
-
-
-def _is_unused(quantity: str, column: Column, edge: MeteringEdge) -> bool:
-    """Tell whether a pressure is none that the reader takes: one beside the edge's, or a supply's without a unit."""
-    beside = bool(edge.quantities) and quantity not in edge.quantities
-    return quantity in PRESSURES and (beside or (not edge.ambiguous and quantity in ("pP", "pT") and not column.unit))
 
 
 def _why_unreadable(path: Path, quantity: str, column: Column) -> str:

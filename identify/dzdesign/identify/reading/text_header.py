@@ -195,11 +195,6 @@ def _joined(lines: list[Line]) -> list[Line]:
 
 def _best_header(lines: list[Line], path: Path) -> tuple[int, str] | None:
     """Return which line is the header, and what parts its cells; None if no rows of numbers tell."""
-    first = _usual_separator(lines[0].text)
-    if len(lines) > 1 and _could_be_labels(cells := cells_of(lines[0].text, first)):  # as of most files
-        second = cells_of(lines[1].text, first)
-        if len(cells) == len(second) and _is_row_of_numbers(second):
-            return 0, first
     for separator in IN_DOUBT:
         rows = _first_row(lines, separator)
         if rows is None:
