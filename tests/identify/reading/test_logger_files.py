@@ -56,18 +56,6 @@ def assert_is_the_ramp(test, rows=slice(None)):
     np.testing.assert_allclose(test.q, L_MIN * Q[rows], atol=L_MIN * 1e-4)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", FILES)
-def test_init_then_identify(here, name):
-    make, options = FILES[name]
-    Path("ramp.csv").write_bytes(make())
-    assert main(["-q", "init", "ramp.csv", *options]) == 0
-    assert main(["-q", "identify", "ramp.csv", "--config", "dzdesign.toml"]) == 0
-    (test,) = json.loads(Path("valve.json").read_text())["sides"]["positive"]["tests"]
-    assert (test["u_knee_rising_V"], test["u_knee_falling_V"]) == pytest.approx((5.0, 4.9), abs=0.01)
-    assert test["dp_MPa"] == pytest.approx(2.0, rel=1e-3)
-
-
 @pytest.mark.parametrize("name", FILES)
 def test_read_as_it_is_and_packed(here, name):
     make, options = FILES[name]

@@ -292,7 +292,8 @@ def _wrong_row(cells: Sequence[str], number: int, header: Header, path: Path) ->
     found = f"{len(cells)} cells" if len(cells) > 1 else f"1 cell, {word!r}"
     amiss = len(cells) != width
     what = f"has {found}, expected {width} as in" if amiss else f"is {word!r}, expected samples below"
-    comma = "decimal commas need ';' or a tab between the cells; " if len(cells) == 2 * width else ""
+    is_comma = header.separator == "," and len(cells) == 2 * width
+    comma = "decimal commas need ';' or a tab between the cells; " if is_comma else ""
     return InputError(
         f"'{path}' row {number} {what} the header, row {header.line} ('"
         f"{', '.join(header.labels)[:QUOTED_CHARACTERS]}'); {comma}correct or delete the row, begin it with # if it is "
