@@ -11,7 +11,7 @@ from tests.support.paths import ROOT
 
 #: Of a room: lines of Python, files of Python, lines of templates, C programs, headers and tables.
 ROOM_SIZES = {
-    "core": (2505, 15, 0),
+    "core": (2500, 15, 0),
     "derivation": (4704, 28, 325),
     "identify": (16880, 122, 1064),
     "assess": (1687, 13, 0),

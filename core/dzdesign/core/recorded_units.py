@@ -277,13 +277,8 @@ _NAMES: dict[str, str] = {
 
 
 def name_of_unit(written: str) -> str:
-    """Return the name of a unit as written somewhere; empty if that is no text for people."""
-    return _NAMES.get(written.lower(), plain_unit(without_reference(written)))
-
-
-def plain_unit(name: str) -> str:
-    """Return a unit's name as it may stand in a text: one printable line; empty if it is none."""
-    name = " ".join(name.split())
+    """Return the name of a unit as written somewhere, on one printable line; empty if that is no text for people."""
+    name = _NAMES.get(written.lower()) or " ".join(without_reference(written).split())
     return name if name.isprintable() and len(name) <= LONGEST_UNIT else ""
 
 
