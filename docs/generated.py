@@ -4,13 +4,17 @@ import importlib
 import inspect
 from collections.abc import Callable, Iterator
 from dataclasses import fields
+from fractions import Fraction
 from json import dumps
 from pkgutil import resolve_name
 from typing import Any, get_type_hints
 
+import msgspec
+
 from dzdesign.codegen.calibration.layout import SHAPE_BITS, Member, members
 from dzdesign.command_line.parser import COMMANDS, arguments_of_command, command_module, usage_of
-from dzdesign.core.artefact_reading import json_schema
+from dzdesign.core.artefact_reading import LARGEST_INTEGER
+from dzdesign.core.artefact_types import Artefact, JsonText, schema_of
 from dzdesign.core.options import field_docstrings
 from dzdesign.identify.data_quality.catalogue import catalogue
 
@@ -63,6 +67,20 @@ SCHEMAS = {
         "dzdesign.derivation.presentation.content:DerivationReport", "derivation.json", "derive --format json"
     ),
 }  # fmt: skip
+#: Node of a JSON Schema.
+Node = dict[str, Any]
+#: A Fraction in JSON.
+FRACTION: Node = {
+    "type": "array",
+    "prefixItems": [
+        {"title": "numerator", "type": "integer", "minimum": -LARGEST_INTEGER, "maximum": LARGEST_INTEGER},
+        {"title": "denominator", "type": "integer", "minimum": 1, "maximum": LARGEST_INTEGER},
+    ],
+    "items": False,
+    "minItems": 2,
+    "maxItems": 2,
+}
+
 
 
 def commands() -> str:
@@ -222,6 +240,79 @@ def key_lines(artefact: type) -> list[str]:
 def schema_document(name: str) -> dict[str, Any]:
     """Return a schema (JSON Schema, draft 2020-12), one of `SCHEMAS`."""
     return json_schema(resolve_name(SCHEMAS[name][0]))
+
+
+def json_schema(kind: type[Artefact]) -> Node:
+    """Return the JSON Schema (draft 2020-12) of an artefact, with units, bounds and descriptions.
+
+    Further keys are welcome in every object (no ``additionalProperties: false``), as they are to the reader; a rule
+    between fields is not in it.
+    """
+    components = msgspec.json.schema(kind, schema_hook=_schema_of_other_types)["$defs"]
+    definitions: dict[str, Node] = {name: _tidy(node) for name, node in components.items()}
+    for found in _dataclasses(msgspec.inspect.type_info(kind)):
+        node, names = definitions[found.__name__], [field.name for field in fields(found)]
+        for name, sentence in field_docstrings(found).items():
+            node["properties"][name] = {"description": "", **node["properties"][name]} | {"description": sentence}
+        # In the order of the file, and each of them: a default is for who makes one in Python. A field that may be
+        # unset stands in the file only where it says something.
+        required = [field.name for field in fields(found) if field.default is not msgspec.UNSET]
+        node |= {"properties": {name: node["properties"][name] for name in names}, "required": required}
+    root = definitions.pop(kind.__name__)
+    if "#/$defs/Fraction" in str((root, definitions)):
+        definitions["Fraction"] = {"description": "An exact number.", **FRACTION}
+    family, _, version = schema_of(kind).removeprefix("dzdesign.").partition("/")
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$id": f"urn:dzdesign:schema:{family}:{version}",
+        "title": kind.FILE_NAME,
+        **root,
+        "$defs": definitions,
+    }
+
+
+def _schema_of_other_types(kind: type) -> Node:
+    if kind is Fraction:
+        return dict(FRACTION)
+    if issubclass(kind, JsonText):
+        return {"type": "string"}
+    raise NotImplementedError  # msgspec then names the type
+
+
+def _dataclasses(info: object) -> Iterator[type]:
+    """Yield the dataclasses that a type is made of, some of them more than once."""
+    if isinstance(info, msgspec.inspect.DataclassType):
+        yield info.cls
+    for name in getattr(info, "__struct_fields__", ()):
+        value = getattr(info, name)
+        for part in value if isinstance(value, tuple) else (value,):
+            if isinstance(part, msgspec.inspect.Type | msgspec.inspect.Field):
+                yield from _dataclasses(part)
+
+
+def _tidy(node: Any) -> Any:
+    """Return a node as a person would write it: a short description, and null as one of the types."""
+    if isinstance(node, list):
+        return [_tidy(item) for item in node]
+    if not isinstance(node, dict):
+        return node
+    node = {key: _tidy(value) for key, value in node.items()}
+    if "properties" in node:  # of a class: its name is the definition's, and of its docstring the first paragraph
+        node.pop("title", None)
+        for value in node["properties"].values():
+            value.pop("default", None)  # it stands in every file
+        node["description"] = " ".join(node["description"].partition("\n\n")[0].split())
+    match node:
+        case {"prefixItems": [{"title": "numerator"}, _]}:
+            about = {key: value for key, value in node.items() if key not in FRACTION}
+            return {**about, "$ref": "#/$defs/Fraction"}
+        case {"anyOf": [{"type": str(kind)} as one, {"type": "null"}], **rest}:
+            return {**rest, **one, "type": [kind, "null"]}
+        case {"anyOf": [{"enum": [*values]}, {"type": "null"}], **rest}:
+            return {**rest, "enum": [*values, None]}
+        case {"enum": [value], **rest}:
+            return {**rest, "const": value}
+    return node
 
 
 def schema_text(name: str) -> str:

@@ -5,9 +5,10 @@ from fractions import Fraction
 import pytest
 
 from dzdesign.core.artefact_types import RuleError
-from dzdesign.core.dither import Dither, DrivenDither, read_dithered
+from dzdesign.core.dither import Dither, read_dithered
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import AS_COMPUTED, CommandUnit, RecordedUnits
+from dzdesign.design.drive_functions import DrivenDither
 
 IN_mA = RecordedUnits(command=CommandUnit(unit="mA", at_zero=4.0, factor=1.6))
 FALLING = RecordedUnits(command=CommandUnit(unit="codes", at_zero=4000.0, factor=-400.0))

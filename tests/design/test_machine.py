@@ -7,7 +7,7 @@ import pytest
 
 from dzdesign.codegen.project import target_named
 from dzdesign.core.artefact_types import RuleError
-from dzdesign.core.dither import Dither, DrivenDither
+from dzdesign.core.dither import Dither
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.recorded_units import CommandUnit, RecordedUnits
 from dzdesign.design import ceiling
@@ -15,6 +15,7 @@ from dzdesign.design.ceiling import offset_ceiling
 from dzdesign.design.certificate import guarded_curve, with_certificates
 from dzdesign.design.costs import colder_coil
 from dzdesign.design.designing import design
+from dzdesign.design.drive_functions import DrivenDither
 from dzdesign.design.lot_setting import lot_margins, lot_setting, prove_lot
 from dzdesign.design.machine import check_bench_current, dither_reserve, recorded_full_A
 from dzdesign.design.redesign import prove_derived

@@ -2,8 +2,6 @@
 
 import re
 from dataclasses import dataclass
-from fractions import Fraction
-from math import ceil
 from typing import Annotated
 
 from dzdesign.core.artefact_types import RuleError, quantity
@@ -15,8 +13,6 @@ from dzdesign.core.units import measures, parse_quantity, si_factor
 LOWEST_HZ, HIGHEST_HZ = 100.0, 300.0
 LARGEST_PEAK = 0.1
 EXAMPLE = "150 Hz 1 %"
-#: Share of a recorded frequency by which that of the drive may differ: half a wave is a whole number of PWM periods.
-SAME_FREQUENCY = Fraction(5, 100)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,49 +105,3 @@ def read_dithered(text: str, option: str) -> DeclaredDither:
     if percent:
         declared.of(RecordedUnits(), 1.0)  # refused before the recordings are read
     return declared
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DrivenDither:
-    """The dither that a drive makes, in the firmware's integers; 0 counts: none."""
-
-    counts: int
-    compare_max: int
-    frequency_Hz: Fraction
-
-    def check(self, recorded: Dither | None) -> None:
-        """Refuse one that is not that of the recordings, where they had one: of any other valve.json knows nothing.
-
-        With a smaller one the hysteresis is wider, so that the valve closes lower, and with a larger one the knee is
-        softer.
-        """
-        if recorded is None:
-            return
-        asked = f"the ramps were recorded with a dither of {recorded.in_words()}"
-        remedy = f'give --dither "{recorded.in_words()}", or record ramps with the one that is wanted'
-        if not self.counts:
-            raise InputError(f"{asked}, without which the valve closes lower, but --dither is off; {remedy}")
-        if abs(self.counts - Fraction(repr(recorded.peak)) * self.compare_max) > Fraction(1, 2):
-            raise InputError(f"{asked}, but --dither has a peak of {self.counts / self.compare_max:.4%}; {remedy}")
-        if abs(self.frequency_Hz / Fraction(repr(recorded.frequency_Hz)) - 1) > SAME_FREQUENCY:
-            made = f"{float(self.frequency_Hz):.6g} Hz"
-            raise InputError(
-                f"{asked}, but --dither makes {made}, half a wave being whole PWM periods; expected the recorded "
-                f"frequency within {float(SAME_FREQUENCY):.0%}; give that to --dither, or record ramps with one that "
-                f"the PWM makes, such as {made}"
-            )
-
-    def reserve(self, recorded: Dither | None) -> int:
-        """Return by how many counts the offset stays lower for the dither.
-
-        By the whole peak where the ramps had none: at the wave's top zero command must be shut. Recorded with it they
-        count it already, and what is left is that the drive's wave is not quite theirs. The motion that a dither makes
-        falls with the square of its frequency at most (a mass on a spring, above its resonance), and a valve whose
-        force and flow only rise with its drive passes no more at a command than with the recorded wave at one higher
-        by the difference of the peaks.
-        """
-        if recorded is None:
-            return self.counts
-        peak = Fraction(repr(recorded.peak)) * self.compare_max
-        moved = self.counts * abs(1 - (Fraction(repr(recorded.frequency_Hz)) / self.frequency_Hz) ** 2)
-        return ceil(abs(self.counts - peak) + moved)

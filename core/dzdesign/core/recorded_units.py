@@ -1,4 +1,4 @@
-"""The units in which a person sees what is computed in V, MPa, L/min and A; converted here only.
+"""The units in which a person sees what is computed in V, MPa and L/min; converted here only.
 
 They are those of the recordings.
 
@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from string import Formatter
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, final
 
-from msgspec import UNSET, Meta, UnsetType
+from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError, quantity
 from dzdesign.core.units import without_reference
@@ -66,31 +66,21 @@ class FlowUnit:
     factor: Annotated[float, quantity("min/L", "Number of these units in 1 L/min.", gt=0, le=1e12)] = 1.0
 
 
-@final
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CurrentUnit:
-    """Unit of a solenoid's current."""
-
-    unit: UnitName = "A"
-    factor: Annotated[float, quantity("1/A", "Number of these units in 1 A.", gt=0, le=1e12)] = 1.0
-
-
 Quantity = Literal["command", "pressure", "flow"]
 Unit = CommandUnit | PressureUnit | FlowUnit
 
 
 @dataclass(frozen=True, slots=True)
 class _Kind:
-    """A unit in which something is computed: powers of command, pressure, flow and current in it, and how it is named.
+    """A unit in which something is computed: powers of command, pressure and flow in it, and how it is named.
 
-    `label` is how it is named where its quantities are not in V, MPa, L/min and A; `scale` brings it to them.
+    `label` is how it is named where its quantities are not in V, MPa and L/min; `scale` brings it to them.
     """
 
     label: str
     u: int = 0
     dp: int = 0
     q: int = 0
-    i: int = 0
     scale: float = 1.0
     #: A reading, which has a zero, and no difference of two.
     reading: bool = False
@@ -109,14 +99,14 @@ _KINDS = {
     "L/min a volt": _Kind("{q} per {u}", u=-1, q=1),
     "mV/MPa²": _Kind("{u}/{dp}²", u=1, dp=-2, scale=1e-3),
     "L/min per MPa": _Kind("{q} per {dp}", dp=-1, q=1),
-    "A": _Kind("{i}", i=1),
+    "A": _Kind("A"),
 }
 _FORMAT = re.compile(r"(?P<sign>\+?)(?:\.(?P<digits>\d+))?(?P<kind>[fg])")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecordedUnits:
-    """Units in which a valve is shown; the numbers of an artefact are in V, MPa, L/min and A whatever these are."""
+    """Units in which a valve is shown; the numbers of an artefact are in V, MPa and L/min whatever these are."""
 
     command: CommandUnit = CommandUnit()
     """Unit of the command."""
@@ -124,8 +114,6 @@ class RecordedUnits:
     """Unit of the pressure drop."""
     flow: FlowUnit = FlowUnit()
     """Unit of the flow."""
-    current: CurrentUnit | UnsetType = UNSET
-    """Unit of a solenoid's current; A if the key is absent."""
     differ: tuple[Quantity, ...] = ()
     """Quantities whose units differ between the recordings. They are displayed in V, MPa or L/min."""
 
@@ -152,10 +140,6 @@ class RecordedUnits:
     def falling(self) -> bool:
         """Whether the reading of the command falls where the valve opens."""
         return self.command.factor < 0
-
-    @property
-    def _current(self) -> CurrentUnit:
-        return self.current or CurrentUnit()
 
     def text(self, value: float, form: str) -> str:
         """Return a number with its unit.
@@ -189,7 +173,7 @@ class RecordedUnits:
         kind = _KINDS[unit]
         if self._as_computed(kind):
             return "V" if unit == "dV" else unit
-        return kind.label.format(u=self.command.unit, dp=self.pressure.unit, q=self.flow.unit, i=self._current.unit)
+        return kind.label.format(u=self.command.unit, dp=self.pressure.unit, q=self.flow.unit)
 
     def convert(self, value: Number, unit: str) -> Number:
         """Return a number or an array of the unit in which it is computed in that of the recordings, for a plot."""
@@ -211,7 +195,7 @@ class RecordedUnits:
         return f"at {first} {unit}" if first == last else f"from {first} to {last} {unit}"
 
     def in_words(self) -> str:
-        """Return what is shown in which unit; nothing where all are V, MPa, L/min and A."""
+        """Return what is shown in which unit; nothing where all are V, MPa and L/min."""
         command, parts = self.command, []
         if not self._as_computed(_KINDS["V"]):
             declared = f" ({command.declared})" if command.declared else ""
@@ -219,7 +203,6 @@ class RecordedUnits:
             parts.append(f"command in {command.unit}{declared}{counted}")
         parts += [f"pressure drop in {self.pressure.unit}"] if self.pressure.factor != 1 else []
         parts += [f"flow in {self.flow.unit}"] if self.flow.factor != 1 else []
-        parts += [f"currents in {self._current.unit}"] if self._current.factor != 1 else []
         differing = f"the recordings differ in the unit of {' and '.join(self.differ)}, shown in " + " and ".join(
             {"command": "V", "pressure": "MPa", "flow": "L/min"}[name] for name in self.differ
         )
@@ -233,14 +216,12 @@ class RecordedUnits:
             (kind.u and (command.unit, command.at_zero, command.factor) != ("V", 0.0, 1.0))
             or (kind.dp and (self.pressure.unit, self.pressure.factor) != ("MPa", 1.0))
             or (kind.q and (self.flow.unit, self.flow.factor) != ("L/min", 1.0))
-            or (kind.i and (self._current.unit, self._current.factor) != ("A", 1.0))
         )
 
     def _gain(self, kind: _Kind) -> float:
         """Return the factor of a unit; that of a difference is positive: it counts from zero command outwards."""
         factor = self.command.factor if kind.reading else abs(self.command.factor)
-        others = self.pressure.factor**kind.dp * self.flow.factor**kind.q * self._current.factor**kind.i
-        return kind.scale * factor**kind.u * others
+        return kind.scale * factor**kind.u * self.pressure.factor**kind.dp * self.flow.factor**kind.q
 
 
 def _without_exponent(value: float, spec: str) -> str:
@@ -296,13 +277,8 @@ _NAMES: dict[str, str] = {
 
 
 def name_of_unit(written: str) -> str:
-    """Return the name of a unit as written somewhere; empty if that is no text for people."""
-    return _NAMES.get(written.lower(), plain_unit(without_reference(written)))
-
-
-def plain_unit(name: str) -> str:
-    """Return a unit's name as it may stand in a text: one printable line; empty if it is none."""
-    name = " ".join(name.split())
+    """Return the name of a unit as written somewhere, on one printable line; empty if that is no text for people."""
+    name = _NAMES.get(written.lower()) or " ".join(without_reference(written).split())
     return name if name.isprintable() and len(name) <= LONGEST_UNIT else ""
 
 

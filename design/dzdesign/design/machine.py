@@ -15,10 +15,11 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError, quantity
-from dzdesign.core.dither import Dither, DrivenDither
+from dzdesign.core.dither import Dither
 from dzdesign.core.errors import InputError
 from dzdesign.core.units import measures, si_factor
 from dzdesign.design.current.drive import CurrentDrive
+from dzdesign.design.drive_functions import DrivenDither
 from dzdesign.design.side_law import Component
 from dzdesign.design.signals import Signals
 from dzdesign.identify.valve.model import ValveModel

@@ -17,7 +17,7 @@ from dzdesign.identify.data_quality.pressures import about_mixed_pressures, abou
 from dzdesign.identify.data_quality.recordings import about_recordings, about_rest
 from dzdesign.identify.data_quality.whole_meter import about_whole_meter
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.ramps.dithered_command import without_dither
+from dzdesign.identify.ramps.command import without_dither
 from dzdesign.identify.ramps.sides import tests_of_side
 from dzdesign.identify.reading.low_flow_readings import readings_of_side
 from dzdesign.identify.reading.ramp_test import RampTest

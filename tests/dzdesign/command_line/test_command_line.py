@@ -325,9 +325,8 @@ def test_columns_of_the_command_line_stand_on_top_of_those_of_the_file(tmp_path)
 
 @pytest.mark.parametrize(
     ("unit", "quantity", "meant"),
-    [("megapascl", "pressure", "megapascal"), ("L/mim", "flow", "L/min"), ("litre/minutte", "flow", "litre/minute"),
-     ("BARR", "pressure", "bar"), ("mVV", "voltage", "mV")],
-)  # fmt: skip
+    [("L/mim", "flow", "L/min"), ("BARR", "pressure", "bar"), ("mVV", "voltage", "mV")],
+)
 def test_a_mistyped_unit_names_one_of_its_quantity(unit, quantity, meant):
     with pytest.raises(InputError, match=re.escape(f"(did you mean '{meant}'?)")):
         si_factor(unit, quantity)

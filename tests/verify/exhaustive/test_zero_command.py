@@ -8,11 +8,12 @@ import pytest
 from msgspec import UNSET
 
 from dzdesign.codegen.core.certificate_text import certificate_lines
-from dzdesign.core.dither import Dither, DrivenDither
+from dzdesign.core.dither import Dither
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.ceiling import offset_ceiling
 from dzdesign.design.certificate import guarded_curve, with_certificates
 from dzdesign.design.designing import design
+from dzdesign.design.drive_functions import DrivenDither
 from dzdesign.design.lot_setting import lot_setting
 from dzdesign.design.options import DesignOptions
 from dzdesign.identify import identification

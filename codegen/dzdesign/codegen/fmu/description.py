@@ -166,8 +166,7 @@ def _displayed(model: Model, unit: str, command: bool) -> tuple[str, float, floa
     units = model.units
     if unit == "V":
         return label, units.command.factor, units.command.at_zero
-    current = units.current.factor if units.current else 1.0
-    return label, {"MPa": units.pressure.factor, "L/min": units.flow.factor, "A": current}[unit], 0.0
+    return label, {"MPa": units.pressure.factor, "L/min": units.flow.factor}[unit], 0.0
 
 
 def _units(model: Model) -> str:

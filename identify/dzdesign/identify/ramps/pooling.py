@@ -11,7 +11,6 @@ from dzdesign.identify.ramps.branches import Branch
 from dzdesign.identify.ramps.splitting import Ramp
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.left_out import LeftOut
-from dzdesign.identify.valve.recorded_drop import DropColumns
 
 #: Ramps whose pressure drops differ by less than this share are one test.
 SAME_PRESSURE = 0.02
@@ -58,6 +57,9 @@ def group_by_pressure(ramps: Sequence[Ramp]) -> list[list[Ramp]]:
 
 def _pooled(group: list[Ramp]) -> PooledTest:
     first = group[0].test
+    positive, negative = (
+        tuple(dict.fromkeys(chain.from_iterable(each))) for each in zip(*(r.test.dp_from for r in group), strict=True)
+    )
     dp = None if first.dp is None else np.concatenate([ramp.test.dp for ramp in group])
     time, u, q = (np.concatenate([getattr(ramp.test, name) for ramp in group]) for name in ("time", "u", "q"))
     test = RampTest(
@@ -67,7 +69,7 @@ def _pooled(group: list[Ramp]) -> PooledTest:
         u=u,
         q=q,
         dp=dp,
-        dp_from=_different_columns(group),
+        dp_from=(positive, negative),
         dp_sign=first.dp_sign,
         dp_is_declared=any(ramp.test.dp_is_declared for ramp in group),
         unseen=(min(ramp.test.unseen[0] for ramp in group), max(ramp.test.unseen[1] for ramp in group)),
@@ -82,14 +84,6 @@ def _pooled(group: list[Ramp]) -> PooledTest:
         files=tuple(dict.fromkeys((ramp.test.source, ramp.test.sha256) for ramp in group)),
         left_out=tuple(item for ramp in group for item in ramp.left_out),
     )
-
-
-def _different_columns(group: list[Ramp]) -> tuple[tuple[DropColumns, ...], tuple[DropColumns, ...]]:
-    """Return which columns make the pressure drop, at positive and negative commands; of several recordings all."""
-    positive, negative = (
-        tuple(dict.fromkeys(chain.from_iterable(each))) for each in zip(*(r.test.dp_from for r in group), strict=True)
-    )
-    return positive, negative
 
 
 def _joined(group: list[Ramp], rising: bool) -> Branch | None:

@@ -23,16 +23,12 @@ def tests_of_side(tests: Sequence[RampTest], sign: int, u_max: float) -> list[Ra
         both = [smooth.size > 0 and (side * smooth).max() >= SMALLEST_SWEEP * u_max for side in (1, -1)]
         # What shows neither side is refused with the positive one.
         if both[0 if sign > 0 else 1] or (sign > 0 and not any(both)):
-            one = _without_the_other(test, sign, u_max) if all(both) else test
-            found.append(_mirrored(one, u_max) if sign < 0 else one)
+            if all(both):  # the other side's flow and, in some recordings, pressure drop have the other sign
+                of_side = sign * test.u >= -AT_REST * u_max
+                back = np.flatnonzero(of_side[1:] & ~of_side[:-1]) + 1
+                test = replace(test.part(of_side), crossed=tuple(test.time[back].tolist()))
+            found.append(_mirrored(test, u_max) if sign < 0 else test)
     return found
-
-
-def _without_the_other(test: RampTest, sign: int, u_max: float) -> RampTest:
-    """Leave out the other side: its flow and, in some recordings, its pressure drop have the other sign."""
-    of_side = sign * test.u >= -AT_REST * u_max
-    back = np.flatnonzero(of_side[1:] & ~of_side[:-1]) + 1
-    return replace(test.part(of_side), crossed=tuple(test.time[back].tolist()))
 
 
 def flow_is_negative(test: RampTest) -> bool:

@@ -29,7 +29,6 @@ from dzdesign.identify.ramps.medians import median
 from dzdesign.identify.ramps.staircases import find_staircase
 from dzdesign.identify.ramps.sweep_pressure import (
     SHUT_FLOW,
-    Reason,
     SweepLevel,
     joined,
     level_of_swings,
@@ -118,7 +117,9 @@ def split_ramps(test: RampTest, lag: float) -> list[Ramp]:
     side = 0 if stairs is None else stairs.reached
     u = lagged_command(test.time, test.u, lag) if stairs is None else test.u
     sweeps = _sweeps(test, u)
-    reasons = _why_no_ramp(sweeps)
+    slow = [sweep for sweep in sweeps if sweep.is_branch]
+    why = iter(why_no_ramp([sweep.level for sweep in slow], [sweep.test.top for sweep in slow]))
+    reasons = [next(why) if sweep.is_branch else None for sweep in sweeps]  # a jump goes with a ramp
     taken = [sweep for sweep, reason in zip(sweeps, reasons, strict=True) if reason is None]
     groups = _groups(taken, branches=1 if side else 2)
     # Before that, or after, the command that the flow belongs to was not recorded.
@@ -159,13 +160,6 @@ def _in_order_of_levels(test: RampTest) -> RampTest:
     return replace(test.part(order), time=test.time)
 
 
-def _why_no_ramp(sweeps: Sequence[_Sweep]) -> list[Reason | None]:
-    """Tell of each sweep why it is none of a ramp test; a jump goes with a ramp."""
-    slow = [sweep for sweep in sweeps if sweep.is_branch]
-    found = iter(why_no_ramp([sweep.level for sweep in slow], [sweep.test.top for sweep in slow]))
-    return [next(found) if sweep.is_branch else None for sweep in sweeps]
-
-
 def _numbered(found: list[tuple[RampTest, tuple[Branch, ...]]], left_out: list[LeftOut]) -> list[Ramp]:
     """Return the ramps that a recording's parts and their branches are; what was left out goes with the next one."""
     ends = [float(part.time[-1]) for part, _ in found]
@@ -194,7 +188,8 @@ def _sweeps(test: RampTest, u: np.ndarray) -> list[_Sweep]:
             f"'{test.source}': the command jumps back and forth ({turns.size} turns), expected ramps; if the logger "
             "lost samples of the command, leave their cells blank"
         )
-    pace = [_pace(u[part]) for part in rows]
+    # Volts per sample between the holds: over the middle of the range.
+    pace = [0.8 * float(np.ptp(u[part])) / max(int(np.sum(_between_ends(u[part]))), 1) for part in rows]
     slowest = min(one for one, part in zip(pace, rows, strict=True) if np.ptp(u[part]) >= 0.5 * np.ptp(u))
     sweeps = []
     for part, one, turn in zip(rows, pace, [0, *turns], strict=True):
@@ -248,11 +243,6 @@ def _off_level(group: Sequence[_Sweep], test: RampTest) -> np.ndarray:
         part = sweep.test if sweep.test.dp is None else replace(sweep.test, dp=despiked(sweep.test.dp))
         found.append(off_level(part, part.u <= lowest, level))
     return np.concatenate(found)
-
-
-def _pace(u: np.ndarray) -> float:
-    """Return volts per sample between the holds of a sweep: over the middle of its range."""
-    return 0.8 * float(np.ptp(u)) / max(int(np.sum(_between_ends(u))), 1)
 
 
 def _between_ends(u: np.ndarray) -> np.ndarray:
@@ -333,7 +323,10 @@ def _cut(u: np.ndarray, dp: np.ndarray | None, turn: int, direction: np.ndarray)
     before, after = np.flatnonzero(~held[:turn]), np.flatnonzero(~held[turn:])
     start = int(before[-1]) + 1 if before.size else 0
     stop = turn + int(after[0]) if after.size else u.size
-    at_rest = turn if at_top else _middle_of_hold(u, turn, start, stop)
+    at_rest = turn
+    if not at_top:  # the middle of the samples that stand at the lowest command
+        at_bottom = start + np.flatnonzero(u[start:stop] <= u[start:stop].min() + HOLD * np.ptp(u))
+        at_rest = int(at_bottom[at_bottom.size // 2]) if at_bottom.size else turn
     if dp is None or stop - start < 4:
         return at_rest
     # Two levels with the least squares about them; n m^2 of both sides is largest there.
@@ -347,10 +340,3 @@ def _cut(u: np.ndarray, dp: np.ndarray | None, turn: int, direction: np.ndarray)
     share = TWO_PRESSURES if at_top else PRESSURE_STEP  # under flow the pressure drop may sink in a hold
     real = step > share * abs(mean) and gain[cut] > STEP_SIGNIFICANCE**2 * about_levels
     return start + 1 + cut if real else at_rest
-
-
-def _middle_of_hold(u: np.ndarray, turn: int, start: int, stop: int) -> int:
-    """Return the middle of the samples about a turn at the bottom that stand at its lowest command."""
-    lowest = u[start:stop].min() + HOLD * np.ptp(u)
-    at_bottom = start + np.flatnonzero(u[start:stop] <= lowest)
-    return int(at_bottom[at_bottom.size // 2]) if at_bottom.size else turn

@@ -96,7 +96,10 @@ def find_staircase(
     spikes = np.abs(q - smooth) > SPIKE * float(np.ptp(smooth))
     smooth = np.where(spikes, smooth, q)
     last = np.array([np.mean(smooth[end - (end - start) // 4 : end]) for start, end in zip(starts, ends, strict=True)])
-    before = _flow_before(last, taken, side) if side else last
+    base = ~taken  # the level from which each step of one side starts
+    base[0] &= base.sum() == 1
+    start = float(np.median(last[base])) if base.any() else 0.0 if side > 0 else float(last.max())
+    before = np.full(last.size, start)
     response = (
         _response_from_one_level(smooth, starts, ends, last, before, taken, source)
         if side
@@ -144,7 +147,9 @@ def _reached(
         way = u[ends[index - 1] - 1 : starts[index]]
         off = way - levels[index]
         off = off[np.abs(off) > least]
-        if off.size and np.max(np.abs(off[_last_of_one_sign(off)])) >= OVERSHOOT * np.max(np.abs(off)):
+        others = np.flatnonzero(off * off[-1:] < 0)  # on the other side of the level than the last ones
+        last = off[int(others[-1]) + 1 if others.size else 0 :]
+        if off.size and np.max(np.abs(last)) >= OVERSHOOT * np.max(np.abs(off)):
             reached[index] = -int(np.sign(off[-1]))
         low, high = sorted(levels[index - 1 : index + 1].tolist())
         well = max(least, (high - low) / 2)
@@ -152,12 +157,6 @@ def _reached(
         if np.any((crossed >= ends[index - 1]) & (crossed <= starts[index])):
             reached[index], beyond[index] = 1, True
     return reached, float(beyond.mean())
-
-
-def _last_of_one_sign(off: np.ndarray) -> slice:
-    """Return the samples at the end that lie on one side of zero."""
-    others = np.flatnonzero(off * off[-1] < 0)
-    return slice(int(others[-1]) + 1 if others.size else 0, None)
 
 
 def _turning(levels: np.ndarray, least: float) -> float:
@@ -184,14 +183,6 @@ def _one_side(levels: np.ndarray, reached: np.ndarray, least: float, source: str
         f"'{source}': the levels of the command follow in no order, each reached from either side by chance, so they "
         "show neither threshold. Step up and down in order, or each time from zero"
     )
-
-
-def _flow_before(last: np.ndarray, taken: np.ndarray, side: int) -> np.ndarray:
-    """Return the flow from which each step of one side starts (D,): that of the level that all of them start from."""
-    base = ~taken
-    base[0] &= base.sum() == 1
-    start = float(np.median(last[base])) if base.any() else 0.0 if side > 0 else float(last.max())
-    return np.full(last.size, start)
 
 
 def _response_from_one_level(

@@ -55,20 +55,13 @@ FEW = {"POLARS_MAX_THREADS": "2", "OPENBLAS_NUM_THREADS": "1", "MALLOC_ARENA_MAX
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ArrayTable(Table):
-    """A table whose columns are arrays.
+    """A table whose columns are arrays."""
 
-    Attributes
-    ----------
-    file : binary file
-        Open as long as columns are loaded.
-    file_format : FileFormat
-        Of the file.
-    columns : mapping
-        Label -> number of the column in the file, and what the file says of it.
-    """
-
+    #: Open as long as columns are loaded.
     file: BinaryIO
+    #: Of the file.
     file_format: FileFormat
+    #: Label -> number of the column in the file, and what the file says of it.
     columns: Mapping[str, tuple[int, FileColumn]]
     _loaded: dict[str, np.ndarray] = field(default_factory=dict)
 
@@ -117,21 +110,10 @@ def file_formats() -> tuple[FileFormat, ...]:
     return tuple(sorted(found, key=lambda item: -len(item.mark)))
 
 
-def format_of(start: bytes, path: Path) -> FileFormat | None:
-    """Return the format of a file, None if it is text or nothing that dzdesign knows.
-
-    The file's first `LONGEST_MARK` bytes decide where the format has a mark, its suffix where it has none.
-    """
-    for item in file_formats():
-        if start.startswith(item.mark) if item.mark else path.suffix.lower() == item.suffix:
-            return item
-    return None
-
-
 def read_table(
     file: BinaryIO, path: Path, skip_rows: int | None = None, missing: Collection[str] = ()
 ) -> Table:
-    """Read a table of any known format; its first bytes tell which, not its name.
+    """Read a table of any known format; its first bytes tell which, and its suffix where the format has no mark.
 
     Raises
     ------
@@ -140,8 +122,10 @@ def read_table(
     """
     start = file.read(LONGEST_MARK)
     file.seek(0)
-    kind = format_of(start, path)
-    return read_binary_table(file, path, kind) if kind else read_text_table(file, path, skip_rows, missing)
+    for item in file_formats():
+        if start.startswith(item.mark) if item.mark else path.suffix.lower() == item.suffix:
+            return read_binary_table(file, path, item)
+    return read_text_table(file, path, skip_rows, missing)
 
 
 def read_binary_table(file: BinaryIO, path: Path, file_format: FileFormat) -> ArrayTable:

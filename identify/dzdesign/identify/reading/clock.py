@@ -229,18 +229,15 @@ def read_clock(table: Table, column: Column, u_max: float, no_numbers: Sequence[
         known = np.flatnonzero(np.isfinite(seconds))
         day = start_of(f"2000-01-01 {table.cell(label, int(known[0]))}") if known.size and not stamp else None
         of_day = day.seconds % DAY if day else None
-        return Clock(label=label, seconds=seconds, stamp=stamp, of_day=of_day, missing=_marked(table, label))
+        missing = table.marked.get(label, Missing())
+        return Clock(label=label, seconds=seconds, stamp=stamp, of_day=of_day, missing=missing)
     numbers, placeholders = without_placeholders(table.numbers(label), rises=True, declared=no_numbers)
     if column.unit or not may_count_ms(numbers):  # else the whole recording tells what they count
         numbers = in_SI(table, "time", column, numbers, scaling_of(table.path, "time", column, u_max))
     return Clock(
         label=label, seconds=numbers, stamp=table.started(label), counts=True, has_unit=bool(column.unit),
-        missing=_marked(table, label) + placeholders,
+        missing=table.marked.get(label, Missing()) + placeholders,
     )  # fmt: skip
-
-
-def _marked(table: Table, label: str) -> Missing:
-    return table.marked.get(label, Missing())
 
 
 def read_times_of_day(table: Table, label: str) -> tuple[np.ndarray, Start | None]:

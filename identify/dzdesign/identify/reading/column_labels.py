@@ -22,7 +22,6 @@ PRESSURES: tuple[str, ...] = ("dP", *PORTS)
 QUANTITY_OF_COLUMN = {"time": "time", "u": "voltage", **dict.fromkeys(PRESSURES, "pressure"), "Q": "flow"}
 #: How a column is best named, for the messages.
 EXAMPLE_UNITS = {"time": "s", "u": "V", **dict.fromkeys(PRESSURES, "MPa"), "Q": "L/min"}
-EXAMPLE_LABELS = {name: f"{name}_{unit.replace('/', '')}" for name, unit in EXAMPLE_UNITS.items()}
 #: Labels among which the one that was meant is looked for.
 MOST_MEANT = 200
 #: Units of a command that is a share of u_max.
@@ -43,24 +42,16 @@ LONGEST_NAME = 80
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Column:
-    """A column that was found: its label in the file, and its unit ("" if none is known).
+    """A column that was found: its label in the file, and its unit ("" if none is known)."""
 
-    Attributes
-    ----------
-    label, unit : str
-        As the file or ``--columns`` says.
-    stated : str
-        The unit that the file states, where ``--columns`` says another or a range.
-    less : Column or None
-        What is subtracted from it: the command of the other solenoid.
-    clock : Column or None
-        Its own column of time, where that is another than the command's.
-    """
-
+    #: As the file or ``--columns`` says.
     label: str
     unit: str
+    #: The unit that the file states, where ``--columns`` says another or a range.
     stated: str = ""
+    #: What is subtracted from it: the command of the other solenoid.
     less: "Column | None" = None
+    #: Its own column of time, where that is another than the command's.
     clock: "Column | None" = None
 
     @property

@@ -1,13 +1,14 @@
-"""The columns of a recording that its reader takes; or how they may be read, for a person who has yet to declare them.
+"""Which column of a recording is which quantity: by the engineer's word, by its label, or as it may be read.
 
-The reader's own recognition goes first; a quantity whose label it does not know is the only column in a unit of it.
+The reader's own recognition goes first; a quantity whose label it does not know is proposed, for a person to declare,
+where only one column is in a unit of it.
 """
 
 import re
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
-from itertools import combinations
+from dataclasses import dataclass, replace
+from itertools import combinations, permutations
 from pathlib import Path
 
 import numpy as np
@@ -20,28 +21,30 @@ from dzdesign.identify.reading.clock import ClockColumns, is_milliseconds
 from dzdesign.identify.reading.column_labels import (
     COLUMN_NAMES,
     EXAMPLE_UNITS,
+    LONGEST_NAME,
     MOST_MEANT,
     PRESSURES,
     QUANTITY_OF_COLUMN,
     Column,
     fits,
     long_format,
-    names_a_quantity,
+    names_a_quantity_or_current,
     no_flow,
     same_unit,
     split_column,
     split_label,
 )
-from dzdesign.identify.reading.labelled_columns import LESS, labelled_columns, with_own_clocks, without_time
 from dzdesign.identify.reading.metering_edge import (
     PORTS,
-    MeteringEdge,
     gauge_beside_absolute,
     metering_edge,
     which_edge,
 )
-from dzdesign.identify.reading.scaling import range_example, scaling_of
-from dzdesign.identify.reading.table import Table
+from dzdesign.identify.reading.scaling import no_unit, range_example, scaling_of
+from dzdesign.identify.reading.table import AND, Table, clean_label
+
+#: Stands between the commands of two solenoids whose difference is the signed command.
+LESS = re.compile(r"\s[-\u2212\u2013]\s")
 
 #: A label that may be a pressure's, and has no unit: p1, P_in, Druck A, but neither pos nor PWM.
 PRESSURE_LIKE = re.compile(
@@ -71,9 +74,14 @@ def find_columns(table: Table, chosen: Mapping[str, str], sample_rate: float | N
         two edges, or a working port's makes none.
     """
     clocks = ClockColumns(table)
-    columns = labelled_columns(table, chosen, clocks)
+    columns = _labelled(table, chosen, clocks)
     if sample_rate is not None:
-        columns = without_time(table, columns, clocks, sample_rate)
+        time = columns.pop("time", None)
+        if len(clocks.labels) > 1 or (time is not None and fits(time.unit, "time")):
+            raise InputError(
+                f"'{table.path}' has a column of time ('{time.label if time else clocks.labels[0]}'), and "
+                f"--sample-rate declares {sample_rate:g} Hz too; leave one of them out"
+            )
     edge = metering_edge(columns)
     if edge.ambiguous:
         labels = {quantity: column.label for quantity, column in columns.items()}
@@ -94,7 +102,7 @@ def find_columns(table: Table, chosen: Mapping[str, str], sample_rate: float | N
     for quantity in ("u", "time", "Q") if several else ("time", "u", "Q") if sample_rate is None else ("u", "Q"):
         if quantity not in columns:
             raise _missing_column(quantity, table, chosen, columns, clocks, time_is_declared=sample_rate is not None)
-    return columns if sample_rate is not None else with_own_clocks(table, columns, clocks)
+    return columns if sample_rate is not None else _with_own_clocks(table, columns, clocks)
 
 
 def _missing_column(
@@ -102,54 +110,179 @@ def _missing_column(
     *, time_is_declared: bool,
 ) -> InputError:  # fmt: skip
     """Return the error that names the columns found, and what to declare."""
-    begin = f"'{table.path}' has no column of {quantity} (columns found: {table.found_labels()})"
     option, proposed = "", dict[str, Column]()
     with suppress(InputError):
         look = _proposed(table, chosen, clocks, time_is_declared=time_is_declared)
         option, proposed = look.option(time_is_declared=time_is_declared), look.proposed
     unused = [label for label in table.labels[:MOST_MEANT] if split_column(table, label)[0] not in columns]
-    is_flow = quantity == "Q" and "Q" not in proposed
-    if other := long_format(table.labels) or (no_flow(unused) if is_flow else ""):
-        return InputError(begin + other)
+    other = long_format(table.labels) or (no_flow(unused) if quantity == "Q" and "Q" not in proposed else "")
     rate = ', or --sample-rate "100 Hz"' if quantity == "time" and not clocks.labels else ""
     named = f"; expected names with units such as time_s,u_V,dP_MPa,Q_Lmin, or --columns{rate}"
-    return InputError(begin + (option or named))
+    found = f"'{table.path}' has no column of {quantity} (columns found: {table.found_labels()})"
+    return InputError(found + (other or option or named))
+
+
+# by label, or by the engineer's word
+
+
+def _labelled(table: Table, chosen: Mapping[str, str], clocks: ClockColumns) -> dict[str, Column]:
+    """Return what `find_columns` does, without a word on quantities that have no column."""
+    equal, unit = _label_and_unit(table, chosen.get("time", ""))
+    if equal not in table.labels and any(table.in_file(label) == equal for label in table.labels):
+        # Of equal columns of time the command's is meant, if it has one of them.
+        others = {name: text for name, text in chosen.items() if name != "time"}
+        columns = _labelled(table, others, clocks)
+        if "time" in columns and table.in_file(columns["time"].label) == equal:
+            return columns | {"time": replace(columns["time"], unit=unit or columns["time"].unit)}
+    columns = {quantity: _chosen_column(table, quantity, label) for quantity, label in chosen.items()}
+    taken = {each.label for column in columns.values() for each in column.every}
+    edge = metering_edge(chosen)
+    pressures = set(PRESSURES) if edge.ambiguous or edge.quantities else set()
+    also_time = ""
+    for label in table.labels:
+        quantity, in_label = split_column(table, label)
+        if quantity is None or label in taken or quantity in chosen.keys() | pressures:
+            continue
+        is_unit = in_label and (fits(in_label, quantity) or label not in table.units)
+        unit = in_label if is_unit else table.units.get(label, "")
+        unit = "s" if quantity == "time" and not fits(unit, "time") and table.is_clock(label) else unit
+        if quantity in columns and not fits(unit, quantity):
+            continue  # an oil temperature T_degC beside the time t_s, a set point Q_set beside Q_Lmin
+        if quantity in ("pP", "pT", "time") and unit and not fits(unit, quantity):
+            continue  # a thermometer Pt_degC or T_degC
+        if quantity == "time" and "time" in columns and fits(columns["time"].unit, "time"):
+            also_time = label
+            continue
+        if quantity in columns and fits(columns[quantity].unit, quantity):
+            raise InputError(
+                f"'{table.path}'{table.header} has two columns of {quantity}: '{columns[quantity].label}' and "
+                f"'{label}'; choose one, for example --columns \"{quantity}={label}\""
+            )
+        _refuse_two_units(table, quantity, label, in_label)
+        columns[quantity] = Column(label=table.dated(label) if quantity == "time" else label, unit=unit)
+    if "time" not in chosen and "u" in columns and (clock := clocks.of("u", columns["u"].label)):
+        columns["time"] = clocks.column(clock)
+    elif also_time and "u" in columns:
+        raise InputError(
+            f"'{table.path}'{table.header} has columns of time '{columns['time'].label}' and '{also_time}', and which "
+            f"is that of '{columns['u'].label}' can't be told; name them by their quantity, such as t_u_s and t_Q_s, "
+            "or choose one by --columns"
+        )
+    elif also_time:
+        del columns["time"]  # the command will tell which it is
+    return columns
+
+
+def _chosen_column(table: Table, quantity: str, text: str) -> Column:
+    """Return the column that was chosen: the whole text is its label, or else what stands before the last colon."""
+    if quantity == "time" and (pair := table.pair(text)):
+        return Column(label=AND.join(pair), unit="s")
+    label, unit = _label_and_unit(table, text)
+    if quantity == "u" and label not in table.labels and (two := _named_solenoids(table, text)):
+        column, less = (_chosen_column(table, quantity, each) for each in two)
+        if " ".join(column.unit.split()) != " ".join(less.unit.split()) and not same_unit(column.unit, less.unit, "u"):
+            raise InputError(
+                f"'{table.path}': '{column.label}' is in '{column.unit}', '{less.label}' in '{less.unit}'; give both "
+                f'one unit, for example --columns "u={column.label} - {less.label}:{column.unit}"'
+            )
+        return replace(column, less=less)
+    if label not in table.labels:
+        raise table.no_column(label, f"--columns names for {quantity}", quantity)
+    _, in_label = split_column(table, label)
+    bracketed = bool(re.search(r"[\[(]", label))
+    stated = (in_label if bracketed or names_a_quantity_or_current(in_label) else "") or table.units.get(label, "")
+    if not unit:
+        _refuse_two_units(table, quantity, label, in_label)
+    unit = unit or (in_label if bracketed or fits(in_label, quantity) else "") or table.units.get(label, "")
+    if quantity == "time" and not fits(unit, "time") and table.is_clock(label):
+        unit = "s"
+    if not unit:
+        if quantity == "Q" and (other := no_flow([label])):
+            raise InputError(f"'{table.path}'{other.replace(';', ':', 1)}")
+        raise no_unit(table.path, quantity, label)
+    return Column(label=label, unit=unit, stated=stated)
+
+
+def _label_and_unit(table: Table, text: str) -> tuple[str, str]:
+    """Return a column's label and the unit behind it; of a single column ``LABEL#1`` is that too."""
+    label, colon, unit = (text, "", "") if text in table.labels else text.rpartition(":")
+    label, unit = (clean_label(label), unit.strip()) if colon else (text, "")
+    only = label.removesuffix("#1")
+    return (only if label not in table.labels and only in table.labels else label), unit
+
+
+def _named_solenoids(table: Table, text: str) -> tuple[str, str] | None:
+    """Return the two columns, each with its unit, whose difference a text such as ``uA_V - uB_V`` names; else None.
+
+    A unit behind the second one only is that of both.
+    """
+    for less in LESS.finditer(text):
+        one, other = text[: less.start()].strip(), text[less.end() :].strip()
+        (label, unit), (its_label, its_unit) = (_label_and_unit(table, each) for each in (one, other))
+        if label in table.labels and its_label in table.labels and label != its_label:
+            return (f"{label}:{its_unit}" if its_unit and not unit else one), other
+    return None
+
+
+def _refuse_two_units(table: Table, quantity: str, label: str, in_label: str) -> None:
+    """Refuse a label whose unit is another than the one that the file states beside it."""
+    beside = table.units.get(label, "")
+    known = fits(in_label, quantity) and names_a_quantity_or_current(beside)
+    if beside and known and not same_unit(in_label, beside, quantity):
+        raise InputError(
+            f"'{table.path}' column '{label}' says '{in_label}' in its label, and '{beside[:LONGEST_NAME]}' is stated "
+            "as its unit beside it; correct one, or say which it is, for example --columns "
+            f'"{quantity}={label}:{in_label}"'
+        )
+
+
+def _with_own_clocks(table: Table, columns: dict[str, Column], clocks: ClockColumns) -> dict[str, Column]:
+    """Return columns with those of time of their own; refuse another one for the command than its own."""
+    time = columns["time"]
+    for quantity, column in columns.items():
+        own = clocks.of(quantity, column.label) if quantity != "time" else ""
+        if column.less and clocks.of(quantity, column.less.label) != own:
+            raise InputError(
+                f"'{table.path}': '{column.label}' and '{column.less.label}' have clocks of their own, and no "
+                "difference of the two is taken; export the commands with one"
+            )
+        if not own or time.label in (own, table.dated(own)):
+            continue
+        if quantity == "u":
+            raise InputError(
+                f"'{table.path}': '{own}' is the column of time of '{column.label}', but --columns names "
+                f"'{time.label}'; name '{own}', or none"
+            )
+        clock = clocks.column(own)
+        columns[quantity] = replace(column, clock=clock if clock.unit else replace(clock, unit=time.unit))
+    return columns
+
+
+# for a person to declare
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProposedColumns:
-    """How the columns of a recording may be read.
+    """How the columns of a recording may be read."""
 
-    Attributes
-    ----------
-    labels : tuple of str
-        All of the file's.
-    known : dict
-        Quantity -> column that its label, or the engineer, says to be it.
-    proposed : dict
-        Quantity -> column that is the only one it can be, by its unit.
-    unclear : dict
-        Quantity -> why it could not be told.
-    pressures : dict
-        Columns that may make the pressure drop, for a person to say which is which: label -> unit, "" if it has none.
-    command_range : str
-        Column of an unclear command with the range of its numbers, ``duty:0..0.9 = 0..100 %``, for a person to correct;
-        or of two columns that may drive a solenoid each the difference, ``uA_V - uB_V``.
-    times : tuple
-        Labels of the columns that are a time.
-    """
-
+    #: All of the file's.
     labels: tuple[str, ...]
+    #: Quantity -> column that its label, or the engineer, says to be it.
     known: dict[str, Column]
+    #: Quantity -> column that is the only one it can be, by its unit.
     proposed: dict[str, Column]
+    #: Quantity -> why it could not be told.
     unclear: dict[str, str]
+    #: Columns that may make the pressure drop, for a person to say which is which: label -> unit, "" if it has none.
     pressures: dict[str, str]
+    #: Column of an unclear command with the range of its numbers, ``duty:0..0.9 = 0..100 %``, for a person to correct;
+    #: or of two columns that may drive a solenoid each the difference, ``uA_V - uB_V``.
     command_range: str = ""
+    #: Labels of the columns that are a time.
     times: tuple[str, ...] = ()
 
-    @property
-    def to_paste(self) -> str:
-        """What --columns may say, of all that is known or the only one it can be; empty where that is nothing.
+    def option(self, *, time_is_declared: bool) -> str:
+        """Return what to declare, as the rest of a sentence; nothing where the columns tell nothing.
 
         LABEL stands for a label that is not known.
         """
@@ -161,19 +294,14 @@ class ProposedColumns:
             return ""
         if LESS.search(self.command_range):
             labels |= {"u": self.command_range}
+        unknown = " (LABEL: the one that you know)" if {"u", "Q"} - labels.keys() else ""
         labels |= {name: f"LABEL:{EXAMPLE_UNITS[name]}" for name in ("u", "Q") if name not in labels}
-        return ", ".join(f"{name}={label}" for name, label in labels.items() if label)
-
-    def option(self, *, time_is_declared: bool) -> str:
-        """Return what to declare, as the rest of a sentence; nothing where the columns tell nothing."""
-        if not self.to_paste:
-            return ""
-        unknown = " (LABEL: the one that you know)" if "=LABEL:" in self.to_paste else ""
         timeless = not time_is_declared and "time" not in self.known | self.proposed
         clock = ', and --sample-rate "100 Hz" (the rate of your logger)' if timeless else ""
         if timeless and self.times:
             clock = f", and as time that of the command, for example time={self.times[0]}"
-        return f'; by their units, give --columns "{self.to_paste}"{unknown}{clock}'
+        columns = ", ".join(f"{name}={label}" for name, label in labels.items())
+        return f'; by their units, give --columns "{columns}"{unknown}{clock}'
 
     @property
     def bare_pressures(self) -> tuple[str, ...]:
@@ -188,19 +316,11 @@ class ProposedColumns:
         return bool(metering_edge(self.known).quantities)
 
 
-def _two_ports(labels: Iterable[str]) -> dict[str, str]:
+def _two_ports(labels: Collection[str]) -> dict[str, str]:
     """Return the working ports where the labels are alike but for an A and a B, such as ``Druck A [bar]``."""
-    both = list(labels)
-    if len(both) != 2:
-        return {}
-    return next(
-        (
-            {"pA": one, "pB": other}
-            for one, other in (both, both[::-1])
-            if one != other and re.sub(r"(?<![^\W_])A(?![^\W_])", "B", one) == other
-        ),
-        {},
-    )
+    pairs = permutations(labels) if len(labels) == 2 else ()
+    alike = (pair for pair in pairs if re.sub(r"(?<![^\W_])A(?![^\W_])", "B", pair[0]) == pair[1])
+    return next(({"pA": one, "pB": other} for one, other in alike), {})
 
 
 def propose_columns(
@@ -223,9 +343,12 @@ def propose_columns(
 def _proposed(
     table: Table, chosen: Mapping[str, str], clocks: ClockColumns, *, time_is_declared: bool
 ) -> ProposedColumns:
-    known, times = labelled_columns(table, chosen, clocks), clocks.labels
+    known, times = _labelled(table, chosen, clocks), clocks.labels
     edge = metering_edge(known)
-    known = {name: column for name, column in known.items() if not _is_unused(name, column, edge)}
+    # A pressure beside the edge's, or a supply's without a unit, is none that the reader takes.
+    bare = {name for name in ("pP", "pT") if name in known and not known[name].unit and not edge.ambiguous}
+    unused = bare | (set(PRESSURES) - set(edge.quantities) if edge.quantities else set())
+    known = {name: column for name, column in known.items() if name not in unused}
     unclear = {name: why for name, column in known.items() if (why := _why_unreadable(table.path, name, column))}
     taken = {column.label for column in known.values()}
     proposed: dict[str, Column] = {}
@@ -233,7 +356,8 @@ def _proposed(
         if quantity in known or (quantity == "dP" and edge.quantities):
             continue
         candidates = [label for label in _candidates(table, quantity) if label not in taken]
-        named = [label for label in candidates if nearest(re.split(r"[_\[( ]", label)[0], _spellings(quantity))]
+        names = [name for name, its in COLUMN_NAMES.items() if its == quantity and len(name) > 1]
+        named = [label for label in candidates if nearest(re.split(r"[_\[( ]", label)[0], names)]
         port = next((known[name].label for name in PORTS if name in known and quantity == "dP"), None)
         if quantity == "dP" and edge.ambiguous:
             unclear["dP"] = which_edge({name: column.label for name, column in known.items()})
@@ -252,8 +376,11 @@ def _proposed(
         del unclear["time"]
     elif "time" in unclear and u is None and len(times) > 1:
         unclear["time"] += "; that of the command is taken as soon as u is known"
-    command_range = _command_range(table, known, taken) if "u" in unclear else ""
-    command_range = (_two_solenoids(table, known, taken) if "u" in unclear else "") or command_range
+    command_range = _two_solenoids(table, known, taken) if "u" in unclear else ""
+    if "u" in unclear and not command_range:  # one without a unit, or the only one that is named like a duty cycle
+        labels = [known["u"].label] if "u" in known and not known["u"].unit else []
+        labels = labels or [label for label in table.labels if label not in taken and DUTY_LIKE.search(label)]
+        command_range = _range_of(table, labels[0]) if len(labels) == 1 and labels[0] else ""
     drop = {column.label for name, column in proposed.items() if name == "dP"}
     pressures = {} if edge.quantities else _pressures(table, known, taken - drop)
     if command_range:
@@ -277,13 +404,6 @@ def _pressures(table: Table, known: Mapping[str, Column], taken: set[str]) -> di
         elif not table.units.get(label) and PRESSURE_LIKE.fullmatch(label):
             found.setdefault(label, "")
     return found
-
-
-def _command_range(table: Table, known: Mapping[str, Column], taken: set[str]) -> str:
-    """Return the range form of a command without a unit, or of the only column that is named like a duty cycle."""
-    labels = [known["u"].label] if "u" in known and not known["u"].unit else []
-    labels = labels or [label for label in table.labels if label not in taken and DUTY_LIKE.search(label)]
-    return _range_of(table, labels[0]) if len(labels) == 1 and labels[0] else ""
 
 
 def _two_solenoids(table: Table, known: Mapping[str, Column], taken: set[str]) -> str:
@@ -329,16 +449,8 @@ def _range_of(table: Table, label: str) -> str:
     return f"{label}:{f'-{top}' if both else '0'}..{top} = {'-100' if both else '0'}..100 %"
 
 
-def _is_unused(quantity: str, column: Column, edge: MeteringEdge) -> bool:
-    """Tell whether a pressure is none that the reader takes: one beside the edge's, or a supply's without a unit."""
-    beside = bool(edge.quantities) and quantity not in edge.quantities
-    return quantity in PRESSURES and (beside or (not edge.ambiguous and quantity in ("pP", "pT") and not column.unit))
-
-
 def _why_unreadable(path: Path, quantity: str, column: Column) -> str:
     """Return why the reader would refuse a column, or nothing."""
-    if not column.unit:
-        return f"'{column.label}' has no unit; give it after a colon, such as {EXAMPLE_UNITS[quantity]}"
     try:
         scaling_of(path, quantity, column, u_max=1.0)
     except InputError as error:
@@ -367,10 +479,6 @@ def _unit_of(table: Table, label: str) -> str:
     return table.units.get(label) or split_column(table, label)[1]
 
 
-def _spellings(quantity: str) -> list[str]:
-    return [name for name, its in COLUMN_NAMES.items() if its == quantity and len(name) > 1]
-
-
 def _why_none(table: Table, quantity: str, candidates: list[str]) -> str:
     """Return why no column is proposed, with what to do; nothing for a pressure drop that nothing hints at."""
     both = " and ".join(map(repr, candidates))
@@ -390,23 +498,6 @@ def _why_none(table: Table, quantity: str, candidates: list[str]) -> str:
         declared = range_example(quantity, currents[0], _unit_of(table, currents[0]))
         why += f"; if {' or '.join(map(repr, currents))} is it, say what the current means, {declared}"
     why += long_format(table.labels) or (no_flow(table.labels) if quantity == "Q" else "")
-    return f'{why}{_or_first_column(table)}; if there is none, --sample-rate "100 Hz"' if quantity == "time" else why
-
-
-def _or_first_column(table: Table) -> str:
-    """Return how the first column is declared as time, where it rises and has no unit, as LabVIEW's X_Value.
-
-    One that counts the rows is no time: a unit would make a wrong one of it.
-    """
-    first = table.labels[0]
-    if not first or table.units.get(first) or names_a_quantity(split_column(table, first)[1]):
-        return ""
-    try:
-        steps = np.diff(table.numbers(first))
-    except InputError:
-        return ""
-    if not (steps.size and np.all(steps >= 0) and steps.max() > 0):
-        return ""
-    if np.all(steps == 1):
-        return f"; '{first}' counts the rows: export the time beside it"
-    return f"; if '{first}' is it, say its unit, for example --columns \"time={first}:s\""
+    if quantity == "time":
+        why += '; give its unit, for example --columns "time=LABEL:s", or if there is none, --sample-rate "100 Hz"'
+    return why

@@ -16,6 +16,7 @@ import numpy as np
 
 from dzdesign.core.documents import open_bytes, sha256_of_file
 from dzdesign.core.errors import InputError
+from dzdesign.core.units import NUMBER
 from dzdesign.identify.reading.binary_table import read_table
 from dzdesign.identify.reading.channel_clocks import lay_on_one_clock, refuse_an_early_end
 from dzdesign.identify.reading.clock import ASSUMED_MS, Clock, doubt_of_clock, never_back, read_clock
@@ -36,6 +37,8 @@ from dzdesign.identify.reading.table import AND, Table
 MIN_ROWS = 20
 #: First word of the first comment line of a recording that is none: whoever makes one up writes it there.
 SIMULATED_MARK = "SIMULATED"
+#: A comment line that says that this is not a measurement; a spreadsheet may have put it in quotes.
+MARKED = re.compile(rf'^[ \t,;"]*#[ \t"]*{SIMULATED_MARK}\b', re.MULTILINE)
 #: A column of two values is looked for among so many, in so many rows, and changes so often at most.
 MOST_SWITCHES, LONGEST_SWITCH, MOST_CHANGES = 8, 1_000_000, 200
 
@@ -80,43 +83,22 @@ def read_ramp_file(
     with open_bytes(path, "ramp file") as file:
         sha256 = sha256_of_file(file)
         table = read_table(file, path, skip_rows, missing)
-        return _ramp_test(table, sha256, columns or {}, u_max, dp, sample_rate, _numbers_among(missing))
-
-
-def _is_marked(comments: str) -> bool:
-    """Tell whether a comment line says that this is not a measurement; a spreadsheet may have put it in quotes."""
-    return re.search(rf'^[ \t,;"]*#[ \t"]*{SIMULATED_MARK}\b', comments, re.MULTILINE) is not None
-
-
-def _numbers_among(missing: Collection[str]) -> list[float]:
-    """Return those of some texts that are numbers."""
-    numbers = []
-    for text in missing:
-        with suppress(ValueError):
-            numbers.append(float(text.replace(",", ".")))
-    return numbers
+        no_numbers = [float(text) for each in missing if NUMBER.fullmatch(text := each.replace(",", "."))]
+        return _ramp_test(table, sha256, columns or {}, u_max, dp, sample_rate, no_numbers)
 
 
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Channels:
-    """The columns of a recording as they were found and read.
+    """The columns of a recording as they were found and read."""
 
-    Attributes
-    ----------
-    data : dict
-        Quantity -> samples in SI, NaN where one is missing.
-    scalings : dict
-        Quantity -> what turned them into SI, the time apart.
-    missing : dict
-        Label -> what stood there for no value.
-    clock : Clock or None
-        The time; None where the sample rate is declared.
-    """
-
+    #: Quantity -> samples in SI, NaN where one is missing.
     data: dict[str, np.ndarray]
+    #: Quantity -> what turned them into SI, the time apart.
     scalings: dict[str, Scaling]
+    #: Label -> what stood there for no value.
     missing: dict[str, Missing]
+    #: The time; None where the sample rate is declared.
     clock: Clock | None
 
 
@@ -177,7 +159,11 @@ def _ramp_test(
     units = units_of_columns(table.path, found, scalings["u"], u_max)
     switches = list(_switches(table, found, rows[0], complete))
     missing = describe_missing(channels.missing)
-    _refuse_too_few_rows(table.path, rows.shape[1], missing)
+    if rows.shape[1] < MIN_ROWS:
+        left_out = f"; {', '.join(missing.values())} are missing samples" if missing else ""
+        raise InputError(
+            f"'{table.path}' has {rows.shape[1]} complete rows, expected at least {MIN_ROWS} of a ramp test{left_out}"
+        )
     thinned = thin(rows)
     time, u, q, *drop = (np.array(column) for column in thinned.rows)
     doubt = doubt_of_clock(table.path, clock, rows[0], time, u) if clock else ""
@@ -195,7 +181,7 @@ def _ramp_test(
         rows_read=rows.shape[1],
         run=thinned.run,
         clock_doubt=doubt,
-        simulated=_is_marked(table.comments),
+        simulated=MARKED.search(table.comments) is not None,
         missing=missing,
         stamp=clock.stamp if clock else None,
         started=clock.stamp.seconds if clock and clock.stamp else None,
@@ -205,13 +191,6 @@ def _ramp_test(
         switches=tuple(replace(each, changes=each.changes / in_ms) for each in switches),
         columns={quantity: found[quantity] for quantity in ("u", "Q")},
     )
-
-
-def _refuse_too_few_rows(path: Path, rows: int, missing: Mapping[str, str]) -> None:
-    if rows < MIN_ROWS:
-        found = ", ".join(missing.values())
-        samples = f"; {found} are missing samples" if found else ""
-        raise InputError(f"'{path}' has {rows} complete rows, expected at least {MIN_ROWS} of a ramp test{samples}")
 
 
 def _switches(table: Table, found: Mapping[str, Column], time: np.ndarray, complete: np.ndarray) -> Iterator[Switch]:

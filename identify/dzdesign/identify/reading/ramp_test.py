@@ -47,48 +47,33 @@ def despiked(u: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, kw_only=True)
 class RampTest:
-    """One recorded ramp test in SI units, read-only.
+    """One recorded ramp test in SI units, read-only."""
 
-    Attributes
-    ----------
-    source, sha256 : str
-        File name (without its folder) and the hash of its bytes.
-    time, u, q : (N,) array
-        Time in s, command in V, flow in m³/s; rows with a missing value are left out.
-    dp : (N,) array or None
-        Pressure drop in Pa, or None if it is unknown.
-    dp_from : pair of tuples of DropColumns
-        Which columns make the pressure drop at positive and at negative commands; empty where none does.
-    dp_sign : int
-        -1 if `dp` was recorded below zero and is given here above it, as a side of a valve has it; 1 if not.
-    side_without_dp : str
-        Side whose metering edge has no pressure drop, "positive" or "negative": its samples were left out.
-    dp_is_declared : bool
-        True if the pressure drop is the engineer's word (one constant) and not a recording.
-    rows_read, run : int
-        Complete rows in the file, and how many of them in a row became one sample, their median (1: none did).
-    clock_doubt : str
-        What is doubtful about the unit of the time, as `clock_doubt` gives it.
-    simulated : bool
-        True if a comment line above the labels begins with `SIMULATED_MARK`.
-    missing : mapping
-        What was taken for missing samples, by kind, as `describe_missing` gives it.
-    """
-
+    #: File name (without its folder) and the hash of its bytes.
     source: str
     sha256: str
+    #: Time in s, command in V, flow in m³/s; rows with a missing value are left out; (N,).
     time: np.ndarray
     u: np.ndarray
     q: np.ndarray
+    #: Pressure drop in Pa, or None if it is unknown; (N,).
     dp: np.ndarray | None
+    #: Which columns make the pressure drop at positive and at negative commands; empty where none does.
     dp_from: tuple[tuple[DropColumns, ...], tuple[DropColumns, ...]] = ((), ())
+    #: -1 if `dp` was recorded below zero and is given here above it, as a side of a valve has it; 1 if not.
     dp_sign: DropSign = 1
+    #: Side whose metering edge has no pressure drop, "positive" or "negative": its samples were left out.
     side_without_dp: str = ""
+    #: True if the pressure drop is the engineer's word (one constant) and not a recording.
     dp_is_declared: bool = False
+    #: Complete rows in the file, and how many of them in a row became one sample, their median (1: none did).
     rows_read: int = 0
     run: int = 1
+    #: What is doubtful about the unit of the time, as `clock_doubt` gives it.
     clock_doubt: str = ""
+    #: True if a comment line above the labels begins with `SIMULATED_MARK`.
     simulated: bool = False
+    #: What was taken for missing samples, by kind, as `describe_missing` gives it.
     missing: Mapping[str, str] = field(default_factory=dict)
     #: Samples over which the command was averaged, as its column shows the dither; 0: it does not.
     dither_averaged: int = 0

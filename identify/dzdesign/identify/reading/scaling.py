@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import final
+from typing import Literal, final
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from dzdesign.core.recorded_units import (
 from dzdesign.core.units import SI_UNIT, SignalRange, measures, read_signal_range, si_factor
 from dzdesign.identify.constants import L_MIN, MPA
 from dzdesign.identify.reading.column_labels import (
-    EXAMPLE_LABELS,
+    EXAMPLE_UNITS,
     LONGEST_NAME,
     PER_CENT,
     PRESSURES,
@@ -48,7 +48,7 @@ MISTYPED = {"ma": "mA", "a": "A", "v": "V", "mv": "mV"}
 #: Where a signal begins that is never below it, A.
 LIVE_ZERO = 0.004
 #: Full scale in the examples of messages.
-FULL_SCALE: Mapping[str, str] = {"u": "0..10 V", "Q": "0..50 L/min"}
+FULL_SCALE = {"u": "0..10 V", "Q": "0..50 L/min", **dict.fromkeys(PRESSURES, "0..250 bar")}
 #: SI numbers beyond these are not a measurement of a valve: a wrong unit, or what a logger writes for an overflow.
 LARGEST = {"time": 1e12, "voltage": 1e4, "pressure": 1e9, "flow": 10.0}
 #: How many of a unit are 1 V, MPa or L/min, where numbers in it can be read: 1 MPa is 1e7 Ba.
@@ -88,12 +88,17 @@ def scaling_of(path: Path, quantity: str, column: Column, u_max: float) -> Scali
             return _of_range(quantity, column, u_max)
         return Scaling(gain=_factor(quantity, column.unit, u_max))
     except InputError as error:
-        raise InputError(f"'{path}' column '{column.label}': {error}{_hint(quantity, column)}") from error
+        is_signal = quantity != "time" and any(measures(column.unit, kind) for kind in TRANSMITTED)
+        example = range_example(quantity, column.label, column.unit) if is_signal else ""
+        hint = f"; say what the signal means, {example}" if is_signal else ""
+        raise InputError(f"'{path}' column '{column.label}': {error}{hint}") from error
 
 
 def no_unit(path: Path, quantity: str, label: str) -> InputError:
     """Return the error for a column whose unit nobody knows."""
-    return InputError(f"'{path}' column '{label}' has no unit; write for example {EXAMPLE_LABELS[quantity]}")
+    meaning = f', or what its numbers mean, --columns "u={label}:0..1 = 0..100 %"' if quantity == "u" else ""
+    example = f'--columns "{quantity}={label}:{EXAMPLE_UNITS[quantity]}"{meaning}'
+    return InputError(f"'{path}' column '{label}' has no unit; write for example {example}")
 
 
 def in_SI(table: Table, quantity: str, column: Column, numbers: np.ndarray, scaling: Scaling) -> np.ndarray:
@@ -116,7 +121,7 @@ def _of_range(quantity: str, column: Column, u_max: float) -> Scaling:
     text = column.unit[:LONGEST_NAME]
     found = read_signal_range(column.unit.strip(), f"'{text}'", points=True)
     if found is None or found.meaning is None:
-        raise InputError(f"'{text}' is no range, expected one such as '4..20 mA = {_full_scale(quantity)}'")
+        raise InputError(f"'{text}' is no range, expected one such as '4..20 mA = {FULL_SCALE[quantity]}'")
     meaning = found.meaning
     if found.unit.lower() in MISTYPED and not any(measures(found.unit, kind) for kind in TRANSMITTED):
         raise InputError(f"'{found.unit}' is no unit of a signal (did you mean '{MISTYPED[found.unit.lower()]}'?)")
@@ -179,17 +184,6 @@ def _factor(quantity: str, unit: str, u_max: float) -> float:
     return si_factor(unit, QUANTITY_OF_COLUMN[quantity])
 
 
-def _full_scale(quantity: str) -> str:
-    return FULL_SCALE.get(quantity, "0..250 bar")
-
-
-def _hint(quantity: str, column: Column) -> str:
-    """Return what to write for a column that holds a transmitter's signal."""
-    if quantity == "time" or not any(measures(column.unit, kind) for kind in TRANSMITTED):
-        return ""
-    return f"; say what the signal means, {range_example(quantity, column.label, column.unit)}"
-
-
 def turned(quantity: str, column: Column, u_max: float) -> str:
     """Return how --columns turns a command that opens the valve as it falls, or a flow of the wrong sign.
 
@@ -206,19 +200,15 @@ def turned(quantity: str, column: Column, u_max: float) -> str:
         if quantity == "u":
             signal = re.sub(r"^(\S+?)\s*\.\.\s*([-+]?[\d.,]*\d)", r"\2..\1", signal)
         else:
-            ends, _, last = meaning.rpartition("..")
-            ends = ends or "0"
-            first, last = (re.sub(r"^([-+]?)(?=0*[1-9.,])", _negated, each.strip()) for each in (ends, last))
-            meaning = f"{first}..{last}"
+            first, _, last = meaning.rpartition("..")
+            minus = {"": "-", "+": "-", "-": ""}
+            ends = (re.split(r"^([-+]?)", each.strip())[1:] for each in (first or "0", last))
+            meaning = "..".join(f"{minus[sign] if re.match('0*[1-9.,]', end) else sign}{end}" for sign, end in ends)
         return f"{quantity}={column.label}:{signal} = {meaning}"
     if quantity == "u":
         end = "100" if unit.lower() in PER_CENT else f"{u_max / si_factor(unit, 'voltage'):g}"
         return f"u={column.label}:{end}..0 {unit} = 0..{end} {unit}"
     return f"{quantity}={column.label}:0..-1 {unit} = 0..1 {unit}"
-
-
-def _negated(sign: re.Match[str]) -> str:
-    return "" if sign[1] == "-" else "-"
 
 
 def range_example(quantity: str, label: str, unit: str) -> str:
@@ -230,7 +220,7 @@ def range_example(quantity: str, label: str, unit: str) -> str:
     'for example --columns "Q=Flow (mA):4..20 mA = 0..50 L/min"'
     """
     signal = "4..20" if measures(unit, "current") else "0..10"
-    return f'for example --columns "{quantity}={label}:{signal} {unit} = {_full_scale(quantity)}"'
+    return f'for example --columns "{quantity}={label}:{signal} {unit} = {FULL_SCALE[quantity]}"'
 
 
 # the units for a reader
@@ -240,13 +230,13 @@ def units_of_columns(
     path: Path, found: Mapping[str, Column], command: Scaling, u_max: float
 ) -> dict[Quantity, tuple[Unit, ...]]:
     """Return the units of a recording's columns, by quantity, with the command's scaling; 100 % of it is `u_max`, V."""
-    pressures = (pressure_unit(found[name].unit) for name in PRESSURES if name in found)
-    units: dict[Quantity, tuple[Unit, ...]] = {
+    pressures = (_recorded_unit("pressure", found[name].unit) for name in PRESSURES if name in found)
+    units: dict[Quantity, tuple[Unit | None, ...]] = {
         "command": (_command_unit(path, found["u"], command, u_max),),
-        "pressure": tuple(dict.fromkeys(unit for unit in pressures if unit)),
-        "flow": tuple(unit for unit in (_flow_unit(found["Q"].unit),) if unit),
+        "pressure": tuple(dict.fromkeys(pressures)),
+        "flow": (_recorded_unit("flow", found["Q"].unit),),
     }
-    return {name: known for name, known in units.items() if known}
+    return {name: known for name, every in units.items() if (known := tuple(unit for unit in every if unit))}
 
 
 def units_of(tests: Sequence[RampTest]) -> RecordedUnits:
@@ -258,13 +248,17 @@ def units_of(tests: Sequence[RampTest]) -> RecordedUnits:
     return common_units(every)
 
 
-def pressure_unit(text: str) -> PressureUnit | None:
-    """Return a unit of pressure, or that of what a transmitter's range means; None if there is none."""
-    unit = _meant(text)
-    if not measures(unit, "pressure"):
+def _recorded_unit(quantity: Literal["pressure", "flow"], text: str) -> PressureUnit | FlowUnit | None:
+    """Return a unit of pressure or flow, or that of what a transmitter's range means; None if there is none.
+
+    Nobody reads a flow in milliamperes.
+    """
+    unit = text.rpartition("=")[2].lstrip(NOT_OF_A_UNIT).strip() if "=" in text else text.strip()
+    if not measures(unit, quantity):
         return None
-    factor = significant(MPA / si_factor(unit, "pressure"))
-    return PressureUnit() if factor == 1 or _extreme(factor) else PressureUnit(unit=name_of_unit(unit), factor=factor)
+    kind, one = (PressureUnit, MPA) if quantity == "pressure" else (FlowUnit, L_MIN)
+    factor = significant(one / si_factor(unit, quantity))
+    return kind() if factor == 1 or _extreme(factor) else kind(unit=name_of_unit(unit), factor=factor)
 
 
 def unit_of_pressure(text: str) -> dict[Quantity, tuple[Unit, ...]]:
@@ -275,21 +269,8 @@ def unit_of_pressure(text: str) -> dict[Quantity, tuple[Unit, ...]]:
     >>> unit_of_pressure("20 bar")
     {'pressure': (PressureUnit(unit='bar', factor=10.0),)}
     """
-    unit = pressure_unit(text.lstrip(NOT_OF_A_UNIT))
+    unit = _recorded_unit("pressure", text.lstrip(NOT_OF_A_UNIT))
     return {"pressure": (unit,)} if unit else {}
-
-
-def _flow_unit(text: str) -> FlowUnit | None:
-    unit = _meant(text)
-    if not measures(unit, "flow"):
-        return None
-    factor = significant(L_MIN / si_factor(unit, "flow"))
-    return FlowUnit() if factor == 1 or _extreme(factor) else FlowUnit(unit=name_of_unit(unit), factor=factor)
-
-
-def _meant(unit: str) -> str:
-    """Return what a transmitter's signal stands for: nobody reads a flow in milliamperes."""
-    return unit.rpartition("=")[2].lstrip(NOT_OF_A_UNIT).strip() if "=" in unit else unit.strip()
 
 
 def _extreme(factor: float) -> bool:

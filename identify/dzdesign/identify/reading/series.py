@@ -121,18 +121,14 @@ def find_copy(tests: Sequence[RampTest]) -> Copy | None:
             part, whole = sorted((early, late), key=lambda test: test.u.size)
             size = np.abs(part.q)
             rows = np.stack([part.u, part.q])[:, size > LARGE_FLOW * size.max(initial=0.0)]
-            if rows.shape[1] >= FEWEST and _is_at_the_pressure_of(part, whole):
+            recorded = [test.dp for test in (part, whole) if test.dp is not None and not test.dp_is_declared]
+            levels = [float(np.median(dp)) for dp in recorded]
+            alike = not levels or (len(levels) == 2 and abs(levels[0] - levels[1]) <= LEVEL * abs(levels[1]))
+            if rows.shape[1] >= FEWEST and alike:
                 agree = _agreeing(rows, whole, np.maximum(steps[one], steps[other]))
                 if agree:
                     return Copy(one=one, other=other, compared=rows.shape[1], agree=agree)
     return None
-
-
-def _is_at_the_pressure_of(part: RampTest, whole: RampTest) -> bool:
-    """Tell whether neither recorded its pressure drop, or both did and it is the same one."""
-    known = [test.dp for test in (part, whole) if test.dp is not None and not test.dp_is_declared]
-    usual = [float(np.median(dp)) for dp in known]
-    return len(known) != 1 and (not known or abs(usual[0] - usual[1]) <= LEVEL * abs(usual[1]))
 
 
 def _agreeing(rows: np.ndarray, whole: RampTest, steps: np.ndarray) -> int:

@@ -48,27 +48,18 @@ def numbered(labels: Sequence[str]) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Table(ABC):
-    """The labelled columns of a file.
+    """The labelled columns of a file."""
 
-    Attributes
-    ----------
-    path : Path
-        The file, for messages.
-    labels : tuple of str
-        In the order of the file; equal ones are `numbered`.
-    units : mapping
-        Label -> unit, where the file states it beside the label and not in it.
-    comments : str
-        The lines that stand above the labels, as they are in the file.
-    clocks : mapping
-        Label -> label of its own column of time, where the file states it for each channel; see
-        `column_labels.clock_of`.
-    """
-
+    #: The file, for messages.
     path: Path
+    #: In the order of the file; equal ones are `numbered`.
     labels: tuple[str, ...]
+    #: Label -> unit, where the file states it beside the label and not in it.
     units: Mapping[str, str] = field(default_factory=dict)
+    #: The lines that stand above the labels, as they are in the file.
     comments: str = ""
+    #: Label -> label of its own column of time, where the file states it for each channel; see
+    #: `column_labels.clock_of`.
     clocks: Mapping[str, str] = field(default_factory=dict)
     #: Of columns that were read: what stood there for no value.
     marked: dict[str, Missing] = field(default_factory=dict)

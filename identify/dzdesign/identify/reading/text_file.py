@@ -1,7 +1,7 @@
 """Files of text: CSV of any delimiter, plain or gzip, with decimal point or comma; an open file in, a `TextTable` out.
 
 What is no text, or too much of it, is refused by name. Rows that look as samples do are taken as they are, all at once;
-each other line is looked at.
+each other line is looked at. Some loggers write a block of words for each channel: see the end of this file.
 """
 
 import codecs
@@ -11,17 +11,27 @@ import logging
 import os
 import re
 import zlib
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING, BinaryIO, final
 
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.reading.logger_blocks import with_stated_times, without_blocks
-from dzdesign.identify.reading.table import QUOTED_CHARACTERS
-from dzdesign.identify.reading.text_header import ASIDE, BLANKS, MOST_LINES, Header, cells_of, find_header, is_value
+from dzdesign.identify.reading.table import QUOTED_CHARACTERS, clean_label
+from dzdesign.identify.reading.text_header import (
+    ASIDE,
+    BLANKS,
+    COMMENT,
+    MOST_LINES,
+    Header,
+    cells_of,
+    find_header,
+    is_value,
+)
 from dzdesign.identify.reading.text_table import TextTable, is_number
+from dzdesign.identify.reading.time_stamps import start_of
 
 if TYPE_CHECKING:
     import polars as pl
@@ -35,7 +45,6 @@ LARGEST_RATIO, FREE_BYTES = 64, 1 << 26
 LONGEST_MARK = 512
 #: Bytes that no text in Windows-1252 has: control codes, and the five that it leaves open.
 NO_TEXT = re.compile(rb"[\x00-\x08\x0e-\x19\x1b\x7f\x81\x8d\x8f\x90\x9d]")
-SAVE_AS_CSV = "; save it again as 'CSV UTF-8'"
 #: Ways out of a file that is no table of text.
 FROM_A_SPREADSHEET = "in the spreadsheet program, save the sheet of the recording by 'Save as', 'CSV UTF-8'"
 FROM_ITS_PROGRAM = "export it from the program that recorded it as CSV or MATLAB"
@@ -70,6 +79,14 @@ STATISTIC = re.compile(
 )
 #: What a logger draws below a table, where nothing else stands in the row.
 RULE = re.compile(r"[-*=_\u2013\u2014]{2,}")
+LABVIEW, END_OF_HEADER, X_VALUE = "LabVIEW Measurement", "***End_of_Header***", "X_Value"
+#: First cells of a line that stands above a segment's header.
+WORD = re.compile(r"[^\W\d]|\*\*\*")
+#: A block of TwinCAT Scope: it begins with the channels' names, ends with their steps, and samples follow the words.
+SCOPE_NAMES, SCOPE_STEP, SCOPE_WORD = re.compile(r"Name[\t;,]"), "SampleTime[ms]", re.compile(r"[^\W\d]|\s|$")
+SCOPE_NAME, SCOPE_TIME = "Name", "Time (ms)"
+#: Lines in which it is looked for, and lines that it has at most.
+SCOPE_LINES, SCOPE_BLOCK = 1000, 42
 logger = logging.getLogger(__name__)
 
 
@@ -150,12 +167,28 @@ def _decoded(file: BinaryIO, path: Path) -> bytes:
         by_name = mark.startswith(rb"\.") and not is_text and re.fullmatch(mark, name)
         if by_name or re.match(mark, start, re.DOTALL):
             raise InputError(f"'{path}' is {what}; {way_out}")
-    text = _from_utf_16(data, path) if is_utf_16 else _in_utf_8(data, path)
-    if b"\0" in text or CELL_END.encode() in text:
-        raise InputError(
-            f"'{path}' is UTF-16 without a byte order mark, or no text at all, expected UTF-8{SAVE_AS_CSV}"
-        )
+    try:
+        text = data if data.isascii() else data.decode("utf-16" if is_utf_16 else "utf-8").encode()
+    except UnicodeError as error:
+        bad, byte = NO_TEXT.search(data), getattr(error, "start", 0)
+        if is_utf_16 or data.startswith(codecs.BOM_UTF8) or not data[:byte].isascii() or bad:
+            byte = bad.start() if bad and data[:byte].isascii() else byte
+            raise _no_text(path, byte) from error
+        text = data.decode("cp1252").encode()
+        logger.debug("'%s' is text in Windows-1252", path)
+    if is_utf_16:
+        logger.debug("'%s' is text in UTF-16", path)
+    if (byte := max(text.find(b"\0"), text.find(CELL_END.encode()))) >= 0:
+        raise _no_text(path, byte)
+    text = text.removeprefix(codecs.BOM_UTF8)
     return text.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in text else text
+
+
+def _no_text(path: Path, byte: int) -> InputError:
+    return InputError(
+        f"'{path}' is not a text file in UTF-8, UTF-16 with a byte order mark, or Windows-1252 (byte {byte + 1}); save "
+        "it again as 'CSV UTF-8'"
+    )
 
 
 def _unpacked(file: BinaryIO, path: Path) -> bytes:
@@ -186,36 +219,6 @@ def _unpacked(file: BinaryIO, path: Path) -> bytes:
             "recording itself, not packed"
         )
     return out.getvalue()
-
-
-def _from_utf_16(data: bytes, path: Path) -> bytes:
-    try:
-        text = data.decode("utf-16").encode()
-    except UnicodeError as error:
-        reason = getattr(error, "reason", error)
-        raise InputError(f"'{path}' begins as UTF-16 and is not ({reason}){SAVE_AS_CSV}") from error
-    logger.debug("'%s' is text in UTF-16", path)
-    return text
-
-
-def _in_utf_8(data: bytes, path: Path) -> bytes:
-    """Return text in UTF-8 or Windows-1252 as the former, without a byte order mark."""
-    try:
-        if not data.isascii():
-            data.decode()
-    except UnicodeDecodeError as error:
-        if data.startswith(codecs.BOM_UTF8) or not data[: error.start].isascii():
-            raise InputError(
-                f"'{path}' is not a text file in UTF-8 throughout (byte {error.start + 1}){SAVE_AS_CSV}"
-            ) from error
-        if bad := NO_TEXT.search(data):
-            raise InputError(
-                f"'{path}' is not a text file, neither in UTF-8 nor in Windows-1252 (byte {bad.start() + 1})"
-                f"{SAVE_AS_CSV}"
-            ) from error
-        logger.debug("'%s' is text in Windows-1252", path)
-        return data.decode("cp1252").encode()
-    return data.removeprefix(codecs.BOM_UTF8)
 
 
 # the samples
@@ -250,7 +253,7 @@ def _samples(lines: "pl.Series", header: Header, path: Path) -> "tuple[pl.DataFr
     for index, cells in others:
         number = header.rows + index + 1
         if is_number(cells[0]) or first < index < last or len(others) > MOST_LINES:
-            raise _wrong_row(cells, number, header, path, above=index < first)
+            raise _wrong_row(cells, number, header, path)
         logger.debug("'%s' row %d is passed over: %s", path, number, " ".join(cells)[:QUOTED_CHARACTERS])
     if split:
         lines, separator = lines.str.replace_all(separator, CELL_END, literal=True), CELL_END
@@ -279,35 +282,181 @@ def _is_no_sample(cells: Sequence[str]) -> bool:
     first = cells[0]
     if not first or (is_value(first) and not RULE.fullmatch(first)):
         return False
-    return not any(cells[1:]) or _is_statistic(first)
+    bare = re.sub(r"[\[(].{0,40}$", "", first[:QUOTED_CHARACTERS]).strip(" :=.")
+    return not any(cells[1:]) or STATISTIC.fullmatch(bare) is not None
 
 
-def _is_statistic(cell: str) -> bool:
-    bare = re.sub(r"[\[(].{0,40}$", "", cell[:QUOTED_CHARACTERS]).strip(" :=.")
-    return STATISTIC.fullmatch(bare) is not None
-
-
-def _wrong_row(cells: Sequence[str], number: int, header: Header, path: Path, *, above: bool) -> InputError:
-    """Return the error for a row that has too many or too few cells, or is a word of the logger amid samples.
-
-    `above`: it stands above all samples, so the header may be none.
-    """
+def _wrong_row(cells: Sequence[str], number: int, header: Header, path: Path) -> InputError:
+    """Return the error for a row that has too many or too few cells, or is a word of the logger amid samples."""
     width, word = len(header.labels), cells[0][:QUOTED_CHARACTERS]
-    the_header = f"the header, row {header.line} ('{', '.join(header.labels)[:QUOTED_CHARACTERS]}')"
-    begin = f"'{path}' row {number} has"
-    if len(cells) != width:
-        comma = header.separator == "," and len(cells) == 2 * width
-        advice = [
-            "decimal commas need ';' or a tab between the cells" if comma else "",
-            "complete the row, or delete it, as a logger that was stopped may have left half of one"
-            if len(cells) < width and is_number(word) and not above
-            else "correct the row, or begin it with # if it is no sample",
-            "--skip-rows says how many rows stand above the header" if above else "",
-        ]
-        found = f"{len(cells)} cell{'s' if len(cells) > 1 else f', {word!r}'}"
-        return InputError(f"{begin} {found}, expected {width} as in {the_header}; {'; '.join(filter(None, advice))}")
-    kind = "a statistic" if _is_statistic(word) else "a word and no number"
+    found = f"{len(cells)} cells" if len(cells) > 1 else f"1 cell, {word!r}"
+    amiss = len(cells) != width
+    what = f"has {found}, expected {width} as in" if amiss else f"is {word!r}, expected samples below"
+    is_comma = header.separator == "," and len(cells) == 2 * width
+    comma = "decimal commas need ';' or a tab between the cells; " if is_comma else ""
     return InputError(
-        f"{begin} {kind}, '{word}', and samples below it, expected nothing but samples below {the_header}; begin "
-        "the row with # if it is no sample, or delete it; --skip-rows says how many rows stand above the header"
+        f"'{path}' row {number} {what} the header, row {header.line} ('"
+        f"{', '.join(header.labels)[:QUOTED_CHARACTERS]}'); {comma}correct or delete the row, begin it with # if it is "
+        "no sample, or say by --skip-rows how many rows stand above the header"
     )
+
+
+# Blocks of words per channel or segment: LabVIEW measurement files (.lvm), TwinCAT Scope's CSV. They are made comments,
+# which keeps the numbers of the lines, and one row of labels stays. What they say of units and times goes into the
+# table: a LabVIEW file may state only start and step of each channel, for each segment anew.
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Segment:
+    """A segment of a LabVIEW file: the line of its labels, and what its header says, a cell a column."""
+
+    line: int
+    header: Mapping[str, list[str]]
+
+    def cell(self, key: str, column: int) -> str:
+        """Return what the header says of a column of values, or nothing."""
+        cells = self.header.get(key, [])
+        return cells[column].strip() if column < len(cells) else ""
+
+    def start(self, column: int) -> str:
+        """Return the date and time at which a channel begins to count, or nothing."""
+        date, time = self.cell("Date", column), self.cell("Time", column)
+        time = re.sub(r"([.,]\d{1,6})\d*$", r"\1", time)
+        return f"{date} {time}" if date and time else ""
+
+    def number(self, key: str, column: int) -> float:
+        """Return a number for a channel; NaN where there is none."""
+        try:
+            return float(self.cell(key, column).replace(",", "."))
+        except ValueError:
+            return np.nan
+
+
+def without_blocks(lines: "pl.Series", start: int, path: Path) -> "tuple[pl.Series, tuple[Segment, ...], bool]":
+    """Return lines whose blocks are comments, the segments of a LabVIEW file, and whether there were any blocks.
+
+    The file begins with the line `start`.
+
+    Raises
+    ------
+    InputError
+        If the segments of a LabVIEW file have other columns.
+    """
+    first = lines.slice(start, SCOPE_LINES).to_list()
+    if first and first[0].startswith(LABVIEW):
+        plain, segments = _of_labview(lines.to_list(), start, path)
+        return plain, tuple(segments), bool(segments)
+    names = next((place for place, line in enumerate(first) if place and SCOPE_NAMES.match(line)), 0)
+    block = range(names + 1, min(names + SCOPE_BLOCK, len(first))) if names else ()
+    times = next((place for place in block if first[place].startswith(SCOPE_STEP)), 0)
+    if not times:
+        return lines, (), False
+    end = next((place for place in range(times + 1, len(first)) if not SCOPE_WORD.match(first[place])), len(first))
+    separator = first[names][len(SCOPE_NAME)]
+    labels = [cell.strip() for cell in first[names].split(separator)]
+    pairs = [SCOPE_TIME if index % 2 == 0 and cell == SCOPE_NAME else cell for index, cell in enumerate(labels)]
+    commented = [f"# {line}" if line.strip() else line for line in first[:end]]
+    commented[names] = separator.join(pairs)
+    return lines.scatter(range(start, start + end), commented), (), True
+
+
+def _of_labview(lines: list[str], start: int, path: Path) -> "tuple[pl.Series, list[Segment]]":
+    import polars as pl
+
+    separator = "," if any(line.startswith("Separator,Comma") for line in lines[:SCOPE_LINES]) else "\t"
+    segments: list[Segment] = []
+    header: dict[str, list[str]] = {}
+    samples, ended, labels = False, False, [""]
+    for index, line in enumerate(lines[start:], start=start):
+        cells = line.split(separator)
+        word = clean_label(cells[0])
+        if samples and not WORD.match(word):
+            if len(cells) > len(labels):  # a comment behind it
+                lines[index] = separator.join(cells[: len(labels)])
+            continue
+        samples = False
+        if word == END_OF_HEADER:
+            ended = True
+        elif ended and word == X_VALUE:
+            segments.append(Segment(line=index + 1, header=header))
+            header, samples, ended = {}, True, False
+            cells = cells[: len(cells) - (clean_label(cells[-1]).lower() == COMMENT)]
+            if len(segments) == 1:
+                labels, lines[index] = cells, separator.join(cells)
+                continue
+            if cells != labels:
+                raise InputError(
+                    f"'{path}' row {index + 1} begins a segment with other columns ('{line[:QUOTED_CHARACTERS]}') than "
+                    f"row {segments[0].line}; make a file of each segment"
+                )
+        elif word:
+            header, ended = ({} if ended else header), False
+            header.setdefault(word, cells)
+        if line.strip():
+            lines[index] = f"# {line}"
+    return pl.Series(lines, dtype=pl.String), segments
+
+
+def with_stated_times(table: TextTable, segments: tuple[Segment, ...]) -> TextTable:
+    """Return the table of a LabVIEW file with the units and the times that its headers state."""
+    import polars as pl
+
+    if not segments:
+        return table
+    units, starts, cells = dict(table.units), {}, table.cells
+    clocks: dict[str, str] = {}
+    waveforms: dict[tuple[str, str], str] = {}
+    labels, first, clock = list(table.labels), segments[0], ""
+    for column, label in enumerate(table.labels):
+        if table.in_file(label) == X_VALUE:
+            clock = label
+            continue
+        if unit := first.cell("Y_Unit_Label", column):
+            units.setdefault(label, unit)
+        stated = tuple(
+            (each.start(column), each.number("X0", column), each.number("Delta_X", column)) for each in segments
+        )
+        own = waveforms.setdefault((clock, str(stated)), clock if clock not in clocks.values() else f"time of {label}")
+        clocks[label] = own
+        if own in starts:
+            continue
+        units[own], starts[own] = "s", first.start(column)
+        times = _times(table, clock if own == clock else "", segments, column)
+        if own not in labels:
+            labels.append(own)
+        if times is not None:  # a new column, or in place of that which the file left blank
+            name = f"field_{labels.index(own)}"
+            cells = cells.with_columns(pl.Series(name, times))
+    return replace(table, labels=tuple(labels), units=units, clocks=clocks, starts=starts, cells=cells)
+
+
+def _times(table: TextTable, label: str, segments: tuple[Segment, ...], column: int) -> np.ndarray | None:
+    """Return the times of a channel, s; None where they are what stands in the file.
+
+    Where the numbers of a segment begin anew, the date and time in its header say by how much it is later.
+    """
+    count = len(table.lines)
+    segment = np.searchsorted([each.line for each in segments], np.asarray(table.lines), side="right") - 1
+    begins = np.searchsorted(segment, np.arange(len(segments)))
+    numbers = table.numbers(label) if label else np.full(count, np.nan)
+    blank = bool(np.all(np.isnan(numbers)))
+    if len(segments) == 1 and not blank:
+        return None
+    if blank:
+        zero, step = (np.array([each.number(key, column) for each in segments]) for key in ("X0", "Delta_X"))
+        if np.isnan(step).any():
+            raise InputError(
+                f"'{table.path}' states no Delta_X for '{table.labels[column]}', and no X_Value; export it with X_Value"
+            )
+        numbers = np.nan_to_num(zero)[segment] + (np.arange(count) - begins[segment]) * step[segment]
+    moments = [start_of(each.start(column)) for each in segments]
+    shift, before = 0.0, 0.0
+    times = numbers.copy()
+    for index, (begin, end) in enumerate(zip(begins, [*begins[1:], count], strict=True)):
+        start, moment = moments[0], moments[index]
+        if index and end > begin and numbers[begin] <= before and start and moment:
+            shift = moment.seconds - start.seconds
+            times[begin:end] += round(shift, 5)
+        before = numbers[end - 1] if end > begin else before
+    return times

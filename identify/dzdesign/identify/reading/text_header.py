@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, final
 from dzdesign.core.errors import InputError
 from dzdesign.core.units import measures
 from dzdesign.identify.reading.column_labels import QUANTITIES, names_a_quantity, split_label
-from dzdesign.identify.reading.logger_blocks import COMMENT
 from dzdesign.identify.reading.missing_values import OF_A_SPREADSHEET, is_no_value
 from dzdesign.identify.reading.table import QUOTED_CHARACTERS, clean_label, numbered
 from dzdesign.identify.reading.text_table import is_number
@@ -24,9 +23,8 @@ from dzdesign.identify.reading.text_table import is_number
 if TYPE_CHECKING:
     import polars as pl
 
-#: An artefact of dzdesign begins with its schema; what else begins so is no table.
-ARTEFACT = re.compile(r'\s*\{\s*"(?:[^"{}]*"\s*:\s*"[^"]*",?\s*")*?schema"\s*:\s*"(dzdesign\.[\w.-]+/\d+)"')
-DOCUMENTS = {"{": "JSON", "<": "HTML or XML"}
+#: What a pattern such as ``ramps/*`` catches beside recordings, by its first character.
+DOCUMENTS = {"{": "JSON, such as a file that dzdesign wrote", "<": "HTML or XML"}
 #: A recording has some ten columns; a header beyond this is not a table, and would take minutes to be searched.
 MOST_COLUMNS, LONGEST_HEADER = 4096, 1 << 20
 #: Lines in which the header is looked for, and the longest of them.
@@ -47,6 +45,8 @@ ASIDE = re.compile(
 )
 #: Lines that stand aside for certain.
 ASIDE_AT_ONCE = r'^(?:[ \t]*#[ \t]|[ \t,;"]*$)'
+#: The column that LabVIEW announces, and leaves out of rows that have no comment.
+COMMENT = "comment"
 logger = logging.getLogger(__name__)
 
 
@@ -68,29 +68,19 @@ class Line:
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Header:
-    """The header row.
+    """The header row."""
 
-    Attributes
-    ----------
-    line : int
-        Its number in the file.
-    labels : tuple of str
-        Of the columns.
-    separator : str
-        What stands between two cells.
-    units : mapping
-        Label -> unit, by a row of units beside it.
-    repeats : frozenset of str
-        The header's line and that of the units: where they stand once more, they are no samples.
-    rows : int
-        Place of the first line below it, words and units aside.
-    """
-
+    #: Its number in the file.
     line: int
+    #: Of the columns.
     labels: tuple[str, ...]
+    #: What stands between two cells.
     separator: str
+    #: Label -> unit, by a row of units beside it.
     units: Mapping[str, str]
+    #: The header's line and that of the units: where they stand once more, they are no samples.
     repeats: frozenset[str]
+    #: Place of the first line below it, words and units aside.
     rows: int
 
 
@@ -140,9 +130,13 @@ def find_header(
     """
     first = _joined(_first_lines(lines, start))
     if not first:
-        size = int(lines.slice(start).str.len_bytes().sum()) + lines.len() - start - 1
-        raise _no_header(path, size, skip_rows)
-    _refuse_a_document("\n".join(lines.slice(start, MOST_BROKEN)), path)
+        skipped = f" below its first {skip_rows} rows (--skip-rows)" if skip_rows else ""
+        raise InputError(
+            f"'{path}' is empty{skipped}, comments and blank lines apart; expected a header row such as "
+            "time_s,u_V,dP_MPa,Q_Lmin and samples"
+        )
+    if document := DOCUMENTS.get(first[0].text.lstrip()[:1]):
+        raise InputError(f"'{path}' is {document}, expected a table of numbers; export the recording as CSV")
     found = None if at_first_line or len(first[0].text) > LONGEST_LINE else _best_header(first, path)
     at, separator = found or (0, _usual_separator(first[0].text))
     line, below = first[at], first[at + 1 :]
@@ -172,16 +166,6 @@ def find_header(
     )
 
 
-def _no_header(path: Path, size: int, skip_rows: int | None) -> InputError:
-    if size >= LONGEST_HEADER:
-        return InputError(
-            f"'{path}' begins with {size} bytes of comments and blank lines; expected a header row such "
-            "as time_s,u_V,dP_MPa,Q_Lmin near its beginning"
-        )
-    below = f" below its first {skip_rows} rows (--skip-rows)" if skip_rows else ""
-    return InputError(f"'{path}' is empty{below}; expected a header row such as time_s,u_V,dP_MPa,Q_Lmin and samples")
-
-
 def _first_lines(lines: "pl.Series", start: int) -> list[Line]:
     """Return the first lines that do not stand aside."""
     found: list[Line] = []
@@ -209,26 +193,8 @@ def _joined(lines: list[Line]) -> list[Line]:
     return lines
 
 
-def _refuse_a_document(beginning: str, path: Path) -> None:
-    """Refuse what a pattern such as ``ramps/*`` catches beside recordings."""
-    artefact = ARTEFACT.match(beginning[:LONGEST_LINE])
-    if artefact:
-        raise InputError(
-            f"'{path}' is no recording but a file that dzdesign wrote ({artefact[1]}); leave it out, for "
-            "example by a pattern such as *.csv"
-        )
-    document = DOCUMENTS.get(beginning.lstrip()[:1])
-    if document:
-        raise InputError(f"'{path}' is {document}, expected a table of numbers; export the recording as CSV")
-
-
 def _best_header(lines: list[Line], path: Path) -> tuple[int, str] | None:
     """Return which line is the header, and what parts its cells; None if no rows of numbers tell."""
-    first = _usual_separator(lines[0].text)
-    if len(lines) > 1 and _could_be_labels(cells := cells_of(lines[0].text, first)):  # as of most files
-        second = cells_of(lines[1].text, first)
-        if len(cells) == len(second) and _is_row_of_numbers(second):
-            return 0, first
     for separator in IN_DOUBT:
         rows = _first_row(lines, separator)
         if rows is None:

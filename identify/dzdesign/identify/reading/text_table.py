@@ -33,10 +33,6 @@ if TYPE_CHECKING:
 
 #: What a column of the dates of its rows is called.
 DATE_LABEL = re.compile(r"(?:log|mess|test)?[ _-]?(?:date|datum)|day|tag|fecha|data", re.IGNORECASE)
-#: A cell with a date.
-DATE = re.compile(r"\d[-/.:]\d+[-/.:]\d")
-#: A number with its unit.
-WITH_UNIT = re.compile(r"[-+]?[\d.,]*\d(?:[eE][-+]?\d+)?\s?((?![eE]$)[^\W\d_][^\s\d]{0,9}|%)")
 #: What stands between thousands and is no decimal mark anywhere: a blank, a narrow or hard one, an apostrophe.
 BETWEEN_THOUSANDS = " \u00a0\u202f'\u2019"
 #: A number with any decimal mark, or with blanks or the like between thousands.
@@ -64,27 +60,18 @@ ADVICE = "export numbers with one mark and no separator of thousands"
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TextTable(Table):
-    """A table of text: its cells as they stand in the file, and where they stand in it.
+    """A table of text: its cells as they stand in the file, and where they stand in it."""
 
-    Attributes
-    ----------
-    cells : DataFrame
-        A column of texts for each label, in their order; of numbers where a header states times by start and step, and
-        where they were read.
-    header_line : int
-        Number of the header's line.
-    lines : (N,) array of int
-        Numbers of the rows' lines.
-    starts : mapping
-        Label of a column of time -> date and time at which it counts zero, where a header states it.
-    missing : collection of str
-        What stands for no value by the engineer's word.
-    """
-
+    #: A column of texts for each label, in their order; of numbers where a header states times by start and step, and
+    #: where they were read.
     cells: "pl.DataFrame"
+    #: Number of the header's line.
     header_line: int
+    #: Numbers of the rows' lines; (N,).
     lines: np.ndarray
+    #: Label of a column of time -> date and time at which it counts zero, where a header states it.
     starts: Mapping[str, str] = field(default_factory=dict)
+    #: What stands for no value by the engineer's word.
     missing: Collection[str] = ()
     #: What columns that were read have shown: label -> decimal mark, a cell that shows it; and label -> mark that may
     #: be one between thousands, a cell with it, where that stands.
@@ -225,11 +212,6 @@ class TextTable(Table):
         dates = dates.set(dates == "", None).fill_null(strategy="forward").fill_null(strategy="backward")
         return (dates + " " + times).zip_with(times != "", times)
 
-    def _refuse_one(self, label: str, texts: "pl.Series", wrong: "pl.Series") -> None:
-        """Refuse the first cell that is no number, if there is one."""
-        for row in wrong.arg_true().head(1):
-            raise self._no_number(label, row, texts[row])
-
     def _with_points(self, label: str, texts: "pl.Series") -> "pl.Series":
         """Return numbers with a decimal point, whatever their decimal mark is, and without one between thousands.
 
@@ -242,42 +224,34 @@ class TextTable(Table):
         if point.any() and comma.any():
             both = texts.filter(comma & point)
             cell = both[0] if len(both) else texts.filter(comma)[0]
-            decimal = max(",.", key=cell.rfind)
-            wrong = (~texts.str.contains(GROUPED[decimal]) & (texts != "")).arg_true()
+            mark = max(",.", key=cell.rfind)
+            wrong = (~texts.str.contains(GROUPED[mark]) & (texts != "")).arg_true()
             if not len(both) or len(wrong):
                 row = int(wrong[0]) if len(wrong) else int(point.arg_true()[0])
                 why = f"stands in one column with '{cell[:QUOTED_CHARACTERS]}', so which mark is the decimal one can't"
                 raise self._doubt(label, self.place(row), texts[row], f"{why} be told")
-            self._take_mark(label, decimal, cell)
-            return texts.str.replace_all(OTHER[decimal], "", literal=True).str.replace(decimal, ".", literal=True)
-        mark = "," if comma.any() else "."
-        for some in (texts.head(FEW_ROWS), texts):
-            marked = some.str.contains(WITH_MARK[mark])
-            plain = (marked & ~some.str.contains(DOUBTFUL[mark])).arg_true()
-            if len(plain):
-                self._take_mark(label, mark, some[int(plain[0])])
-                break
+            self._certain[label] = mark, cell
+            texts = texts.str.replace_all(OTHER[mark], "", literal=True)
         else:
-            # Several points or commas in a number are no decimal ones: left to whoever reads it to refuse.
-            if marked.any():
+            mark = "," if comma.any() else "."
+            for some in (texts.head(FEW_ROWS), texts):
+                marked = some.str.contains(WITH_MARK[mark])
+                plain = (marked & ~some.str.contains(DOUBTFUL[mark])).arg_true()
+                if len(plain):
+                    break
+            if len(plain):
+                self._certain[label] = mark, texts[int(plain[0])]
+            elif marked.any():  # several points or commas in a number are left to whoever reads it to refuse
                 row = int(marked.arg_true()[0])
                 self._doubtful[label] = mark, texts[row], self.place(row)
-                self._refuse_a_contradiction()
                 self._refuse_whole_numbers_beside(label, texts, marked, mark)
-        return texts.str.replace(",", ".", literal=True) if mark == "," else texts
-
-    def _take_mark(self, label: str, mark: str, cell: str) -> None:
-        self._certain[label] = mark, cell
-        self._refuse_a_contradiction()
-
-    def _refuse_a_contradiction(self) -> None:
-        """Refuse a column whose mark may be one of thousands where another cell shows the other as the decimal one."""
-        for label, (mark, cell, place) in self._doubtful.items():
+        for doubtful, (its, cell, place) in self._doubtful.items():
             for other, (decimal, example) in self._certain.items():
-                if decimal != mark:
+                if decimal != its:
                     of_other = f"decimal {NAMES[decimal]} ('{example[:QUOTED_CHARACTERS]}')"
                     why = f"or a decimal, as column '{other[:QUOTED_CHARACTERS]}' has {of_other}"
-                    raise self._doubt(label, place, cell, f"may be {_without_marks(cell)} {why}")
+                    raise self._doubt(doubtful, place, cell, f"may be {re.sub('[.,]', '', cell)} {why}")
+        return texts.str.replace(",", ".", literal=True) if mark == "," else texts
 
     def _refuse_whole_numbers_beside(self, label: str, texts: "pl.Series", marked: "pl.Series", mark: str) -> None:
         """Refuse a column in which 998 and 1.001 stand: nothing measured goes from one to the other."""
@@ -286,38 +260,30 @@ class TextTable(Table):
         numbers = texts.str.replace(mark, ".", literal=True).cast(pl.Float64, strict=False).abs()
         row = int(numbers.set(~marked, None).arg_min() or 0)
         whole = numbers.set(marked | ~texts.str.contains(r"^[-+]?\d+$"), None).arg_max()
-        if whole is None or numbers[whole] < max(LEAST_WHOLE, FAR_LARGER * numbers[row]):
-            return
-        beside = f"stands in one column with '{texts[whole][:QUOTED_CHARACTERS]}'"
-        why = f"{beside}, so it may be {_without_marks(texts[row])} or a decimal"
-        raise self._doubt(label, self.place(row), texts[row], why)
+        if whole is not None and numbers[whole] >= max(LEAST_WHOLE, FAR_LARGER * numbers[row]):
+            beside = f"stands in one column with '{texts[whole][:QUOTED_CHARACTERS]}'"
+            why = f"{beside}, so it may be {re.sub('[.,]', '', texts[row])} or a decimal"
+            raise self._doubt(label, self.place(row), texts[row], why)
 
     def _doubt(self, label: str, place: str, cell: str, why: str) -> InputError:
         return InputError(f"'{self.path}' {place}, column '{label}': '{cell[:QUOTED_CHARACTERS]}' {why}; {ADVICE}")
 
-    def _no_number(self, label: str, row: int, cell: str) -> InputError:
-        what = "is not a number"
-        advice = "correct it; if it stands for no value, leave the cell blank, or name it by --missing"
-        unit = WITH_UNIT.fullmatch(cell)
-        if DATE_OF_A_NUMBER.fullmatch(cell):
-            what = "is a date, which a spreadsheet makes of numbers such as 5.3"
-            advice = "export the recording again, and do not save it in the spreadsheet"
-        elif unit:
-            what = f"has its unit in the cell, '{unit[1]}'"
-            advice = "write plain numbers, all in one unit that the label or --columns says"
-        elif DATE.search(cell):
-            what += f" (a column of the time may hold stamps such as {EXAMPLE})"
-        place = f"'{self.path}' {self.place(row)}, column '{label}'"
-        return InputError(f"{place}: '{cell[:QUOTED_CHARACTERS]}' {what}; {advice}")
+    def _refuse_one(self, label: str, texts: "pl.Series", wrong: "pl.Series") -> None:
+        """Refuse the first cell that is no number, if there is one."""
+        for row in wrong.arg_true().head(1):
+            cell = texts[row]
+            advice = "write a plain number; if it stands for no value, leave the cell blank, or name it by --missing"
+            if DATE_OF_A_NUMBER.fullmatch(cell):
+                advice = "a spreadsheet makes such dates of numbers; export the recording again, do not save it there"
+            elif LIKE_A_DATE.search(cell):
+                advice = f"correct it; a column of the time may hold stamps such as {EXAMPLE}"
+            place = f"'{self.path}' {self.place(row)}, column '{label}'"
+            raise InputError(f"{place}: '{cell[:QUOTED_CHARACTERS]}' is not a number; {advice}")
 
 
 def is_number(cell: str) -> bool:
     """Tell whether a cell is a number, with any decimal mark, a date or a time of day."""
     return NUMBER.fullmatch(cell) is not None or is_stamp(cell) or is_unclear(cell)
-
-
-def _without_marks(cell: str) -> str:
-    return re.sub("[.,]", "", cell)[:QUOTED_CHARACTERS]
 
 
 def _plainly_written(numbers: "pl.Series") -> "pl.Series":

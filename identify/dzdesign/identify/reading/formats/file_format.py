@@ -23,59 +23,40 @@ COLUMN_KINDS, NUMBER_KINDS = "fiubSUOMm", "fiub"
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FileColumn:
-    """A column of a file, not read yet.
-
-    Attributes
-    ----------
-    group, name, unit : str
-        As the file states them, or "". Two columns may have one name in different groups.
-    start : str
-        Of a column of time: date and time at which it counts zero, as `stamp_of` writes it; or "".
-    kind : str
-        Kind of NumPy's type: one of `NUMBER_KINDS` for numbers.
-    size : int
-        Samples.
-    read : callable
-        Returns all samples, (size,).
-    clock : int
-        Number of the column of time of this one among all of the file, where the file states it; else -1.
-    """
+    """A column of a file, not read yet."""
 
     name: str
+    #: Kind of NumPy's type: one of `NUMBER_KINDS` for numbers.
     kind: str
+    #: Samples.
     size: int
+    #: Returns all samples, (size,).
     read: Callable[[], np.ndarray]
+    #: As the file states them, or "". Two columns may have one name in different groups.
     group: str = ""
     unit: str = ""
+    #: Of a column of time: date and time at which it counts zero, as `stamp_of` writes it; or "".
     start: str = ""
+    #: Number of the column of time of this one among all of the file, where the file states it; else -1.
     clock: int = -1
 
 
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FileFormat:
-    """A file format.
+    """A file format."""
 
-    Attributes
-    ----------
-    name : str
-        For messages.
-    columns : callable
-        Yields the columns of an open file, whose path is for messages; what must stay open with the file goes on the
-        stack. Any exception means that the file is not a whole one of this format; an `InputError` says it in a
-        sentence of its own. It runs in a process of its own.
-    mark : bytes
-        First bytes of such a file.
-    suffix : str
-        Of the file's name, lower case, for a format without a mark.
-    hint : str
-        What to do about a file that holds no columns of numbers, or other things too, as the rest of a sentence.
-    """
-
+    #: For messages.
     name: str
+    #: Yields the columns of an open file, whose path is for messages; what must stay open with the file goes on the
+    #: stack. Any exception means that the file is not a whole one of this format; an `InputError` says it in a sentence
+    #: of its own. It runs in a process of its own.
     columns: Callable[[BinaryIO, Path, ExitStack], Iterator[FileColumn]]
+    #: First bytes of such a file.
     mark: bytes = b""
+    #: Of the file's name, lower case, for a format without a mark.
     suffix: str = ""
+    #: What to do about a file that holds no columns of numbers, or other things too, as the rest of a sentence.
     hint: str = ""
 
 
