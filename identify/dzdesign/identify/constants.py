@@ -13,6 +13,8 @@ MPA = 1e6
 L_MIN = 1e-3 / 60
 #: Pressure drops beyond these, Pa, are a wrong unit.
 SMALLEST_DP, LARGEST_DP = 1e3, 200 * MPA
+#: Where ramps stand whose pressure drop is unknown, MPa: nothing depends on it.
+ANYWHERE_MPa = 1.0
 #: Width of a bin of commands over u_max: fine enough that a straight line inside it is exact to the noise.
 BIN_WIDTH = 1e-3
 #: A sweep that comes to this share of the largest command is whole: the valve must have opened in it.

@@ -6,15 +6,16 @@ from collections.abc import Iterator, Sequence
 from dzdesign.identify.constants import MPA
 from dzdesign.identify.data_quality.catalogue import warn
 from dzdesign.identify.fit.scatter import Scatter
-from dzdesign.identify.knees.between_ramps import ASSUMED_REPEATABILITY, FEW_DEGREES
+from dzdesign.identify.knees.between_ramps import ScatterChecks
 from dzdesign.identify.knees.described_tests import DescribedTest
-from dzdesign.identify.knees.scatter_checks import ScatterChecks
-from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.options import ASSUMED_REPEATABILITY, IdentifyOptions
 from dzdesign.identify.valve.bound_proof import BoundProof
 from dzdesign.identify.valve.model import Warning_
 from dzdesign.identify.valve.repeatability import Repeatability
 from dzdesign.identify.valve.side_model import SideModel
 
+#: With fewer degrees of freedom the scatter is known so badly that repeats pay twice.
+FEW_DEGREES = 4
 #: Standard errors from which a drift is said, and share of u_max from which it matters.
 DRIFT_SIGNIFICANCE, SMALLEST_DRIFT = 3.0, 1e-3
 #: Shares of u_max from which an outlying ramp's distance, and the scatter of ramps like their neighbours, matter.

@@ -13,10 +13,10 @@ from dzdesign.identify.data_quality.knee_errors import about_errors
 from dzdesign.identify.data_quality.pressures import about_flow_gains
 from dzdesign.identify.data_quality.sweeps import about_sweeps
 from dzdesign.identify.fitting.certifying import Certified
+from dzdesign.identify.knees.between_ramps import ScatterChecks
 from dzdesign.identify.knees.characteristic import TAIL
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
 from dzdesign.identify.knees.meter_lag import softness_of_filter
-from dzdesign.identify.knees.scatter_checks import ScatterChecks
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.sweep_pressure import SWINGS
 from dzdesign.identify.valve.model import Warning_

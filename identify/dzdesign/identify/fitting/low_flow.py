@@ -16,8 +16,9 @@ import numpy as np
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import worded
 from dzdesign.identify.constants import L_MIN, MPA
-from dzdesign.identify.fitting.guarded_thresholds import DECIMALS, GuardedThreshold, Guarding
+from dzdesign.identify.fitting.guarded_thresholds import GuardedThreshold, Guarding
 from dzdesign.identify.fitting.zero_flow import allowed_at_zero
+from dzdesign.identify.knees.between_ramps import DECIMALS
 from dzdesign.identify.knees.branch_shape import BranchShape
 from dzdesign.identify.knees.described_tests import DescribedTests
 from dzdesign.identify.options import IdentifyOptions

@@ -13,9 +13,6 @@ class Tail:
     zero: float
     zero_se: float
     slope: float
-    #: Command at which it reaches the flow that counts as flow.
-    at_level: float
-    at_level_se: float
     #: Commands between which rows are missing, if flow begins there: then `zero` is the lower of them.
     hole: tuple[float, float] | None = None
 

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -67,8 +66,7 @@ def _describe(
     tail = _find_tail(read, level, line, noise, parts.correlation, u_max)
     onset, onset_se = _find_onset(read, tail, level, noise)
     if dead_zone.depth > 0:  # averages show what no reading does
-        first = line.knee - dead_zone.depth
-        tail, onset = replace(tail, at_level=min(tail.at_level, first)), min(onset, first)
+        onset = min(onset, line.knee - dead_zone.depth)
     return BranchShape(
         prepared=read,
         line=line,
@@ -158,7 +156,9 @@ def _find_tail(
     first, last = crossing(*profile, level), crossing(*profile, TAIL * level)
     hole = hole_within(profile[0], first, first, u_max)
     if hole:
-        return _tail_in_a_hole(profile[0], first, level, hole)
+        # What lies above the missing rows may be straight, and its zero far above a soft edge that nobody recorded: the
+        # valve opens no sooner than at their lower end.
+        return Tail(hole[0], float(np.median(np.diff(profile[0]))), level / (hole[1] - hole[0]), hole)
     tail = (u >= first) & (u <= last)
     seen = tail & (read.branch.q >= 0.5 * read.floor)
     if seen.sum() >= TAIL_SAMPLES and np.unique(u[seen]).size >= TAIL_LEVELS:
@@ -173,12 +173,8 @@ def _find_tail(
             by_blocks = inflation_by_blocks(residual, max(sigma, 1e-12))
             inflation = max(by_blocks, variance_inflation(correlation, roughness, sigma))
             spread = np.sum((u_tail - u_tail.mean()) ** 2)
-            at_level = onset + level / tail_slope
-            errors = [
-                sigma * math.sqrt((1 / u_tail.size + (u_tail.mean() - at) ** 2 / spread) * inflation) / tail_slope
-                for at in (onset, at_level)
-            ]
-            return Tail(onset, errors[0], tail_slope, at_level, errors[1])
+            lever = 1 / u_tail.size + (u_tail.mean() - onset) ** 2 / spread
+            return Tail(onset, sigma * math.sqrt(lever * inflation) / tail_slope, tail_slope)
     # Too few samples for a line, as in a staircase test: the chord, its ends known to one level of the command.
     at = int(np.clip(np.searchsorted(profile[0], first), 1, profile[0].size - 1))
     gap = float(profile[0][at] - profile[0][at - 1])
@@ -186,13 +182,4 @@ def _find_tail(
     chord = (TAIL - 1) * level / width
     error = gap + noise / chord
     # At the level before, less flows than counts, so the zero is not below it.
-    return Tail(max(first - level / chord, float(profile[0][at - 1])), error, chord, first, error)
-
-
-def _tail_in_a_hole(u: np.ndarray, first: float, level: float, hole: tuple[float, float]) -> Tail:
-    """Return what can be said where rows are missing in which the flow begins: no sooner than at their lower end.
-
-    What lies above them may be straight, and its zero far above a soft edge that nobody recorded.
-    """
-    low, high = hole
-    return Tail(low, float(np.median(np.diff(u))), level / (high - low), first, high - low, hole)
+    return Tail(max(first - level / chord, float(profile[0][at - 1])), error, chord)

@@ -12,15 +12,14 @@ from dzdesign.identify.ramps.medians import median
 
 #: Most rounds in which outliers are left out and the line is laid again: each finds those that the ones before hid.
 ROUNDS = 20
-#: Logarithm of the probability below which a run of readings below the floor is not the noise's: about one run in ten
-#: million, and a branch has a hundred.
-UNLIKELY = -16.0
 #: Fewest samples for a line through noise; with fewer it goes from level to level.
 FEWEST = 5
 #: Noise below this share of the largest flow is not believed: no meter is that fine.
 FINEST_NOISE = 1e-5
 #: Blocks into which the residuals in time order are cut, to see how coloured the noise is.
 BLOCKS = 16
+#: Of a standard error from these blocks, less the line's two parameters.
+DEGREES_OF_FREEDOM = BLOCKS - 2
 
 
 def lay_line(read: PreparedBranch, window: tuple[float, float]) -> GatedLine:
@@ -63,7 +62,6 @@ def lay_line(read: PreparedBranch, window: tuple[float, float]) -> GatedLine:
     u_seen = u[seen]
     residual = _within_ramps(y[seen] - slope * (u_seen - knee), branch.ramp_of_samples[inside][seen])
     sigma = max(float(np.sqrt(np.sum(residual**2) / max(u_seen.size - 2, 1))), finest)
-    kept &= ~_runs_of_drop_outs(censored, (slope * (u - knee) - floor) / sigma, residual)
     by_blocks = inflation_by_blocks(residual, sigma)
     return GatedLine(
         window=window,
@@ -88,32 +86,6 @@ def _within_ramps(residual: np.ndarray, ramp: np.ndarray) -> np.ndarray:
     count = np.maximum(np.bincount(ramp), 1)
     within: np.ndarray = residual - (np.bincount(ramp, weights=residual) / count)[ramp]
     return within
-
-
-def _runs_of_drop_outs(censored: np.ndarray, above: np.ndarray, residual: np.ndarray) -> np.ndarray:
-    """Return which censored samples belong to a run that noise does not explain: a logger that was busy, a wire.
-
-    A meter with a floor reads nothing where the flow is a little above it, now and then, but not for long. Taken for
-    little flow, half a second of lost readings just above the knee lifts it, and the bounds with it.
-
-    `censored` (N,) says which samples in the order of time read below the floor, `above` (N,) how far the line is above
-    it at each, in standard deviations. The residuals (M,) of the other samples tell how slow the noise is: slow noise
-    explains longer runs.
-    """
-    edges = np.flatnonzero(np.diff(censored.astype(np.int8), prepend=0, append=0))
-    starts, ends = edges[::2], edges[1::2]
-    lost = np.zeros(censored.size, dtype=bool)
-    if not starts.size or not np.any(above[censored] > 0):
-        return lost
-    from scipy.special import log_ndtr
-
-    slow = float(np.clip(residual[1:] @ residual[:-1] / max(residual @ residual, 1e-300), 0.0, 1.0))
-    news = (1 - slow) / (1 + slow)  # share of a sample that is new, of noise that forgets exponentially
-    length = ends - starts
-    last = np.cumsum(log_ndtr(-above[censored]))[np.cumsum(length) - 1]
-    chance = np.diff(last, prepend=0.0) * (news + (1 - news) / length)
-    lost[censored] = np.repeat(chance < UNLIKELY, length)
-    return lost
 
 
 def _among(inside: np.ndarray, chosen: np.ndarray) -> np.ndarray:

@@ -8,8 +8,8 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import worded
-from dzdesign.identify.constants import FULL_SWEEP, L_MIN, SMALLEST_DP
-from dzdesign.identify.knees.between_ramps import BetweenRamps, knees_of_ramps, pool_scatter
+from dzdesign.identify.constants import FULL_SWEEP, L_MIN, MPA, SMALLEST_DP, ANYWHERE_MPa
+from dzdesign.identify.knees.between_ramps import BetweenRamps, compare_ramps, knees_of_ramps
 from dzdesign.identify.knees.branch_shape import BranchShape
 from dzdesign.identify.knees.characteristic import describe_branches
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
@@ -204,9 +204,12 @@ def _between_ramps(described: list[DescribedTest], column: int, options: Identif
     shapes = [shape for item in described if (shape := item.shapes[column])]
     if not shapes:
         return None
-    declared = None if options.repeatability is None else options.repeatability * options.u_max
-    known = knees_of_ramps(shapes, [item.when for item in described], [item.switched for item in described])
-    return pool_scatter(known, [len(item.when) for item in described], declared=declared, u_max=options.u_max)
+    known = knees_of_ramps(
+        shapes, [item.ramps for item in described], [item.when for item in described],
+        [item.switched for item in described],
+    )  # fmt: skip
+    dp_MPa = np.array([ANYWHERE_MPa if item.dp is None else item.dp / MPA for item in described])
+    return compare_ramps(known, dp_MPa, [len(item.when) for item in described], options)
 
 
 def _with_ramps_together(item: PooledTest, row: int, between: Sequence[BetweenRamps | None]) -> PooledTest:

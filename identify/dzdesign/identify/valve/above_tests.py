@@ -45,11 +45,6 @@ class AboveTests:
         """Return the bound on the interval of the nodes, exact."""
         return CertifiedBound.of(self.dp_MPa, self.u_lower_V)
 
-    def check(self, last_MPa: float, lower_V: float) -> None:
-        """Refuse a bound that does not begin at the last test, at most where its own bound is."""
-        if abs(self.dp_MPa[0] - last_MPa) > ROUNDING or self.u_lower_V[0] > lower_V + ROUNDING:
-            raise RuleError("the bound above the tests must begin at the last test's")
-
     def in_words(self, premise: str) -> str:
         """Return what the continued bound rests on."""
         rests: dict[str, str] = {

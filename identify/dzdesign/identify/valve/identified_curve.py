@@ -1,7 +1,6 @@
 """`IdentifiedCurve`: what the data say of one branch's threshold over the pressure drop, for valve.json."""
 
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Annotated
 
 from dzdesign.core.artefact_types import RuleError, quantity
@@ -15,8 +14,6 @@ from dzdesign.identify.valve.quantity_types import (
 
 #: The branches, by what the valve does on them.
 IDENTIFIED = ("closing", "opening")
-#: Numbers of the file have seven decimals: a ratio of two thresholds of 1 mV or more is that of the file to this.
-BETA_ROUNDING = 1e-3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,16 +32,9 @@ class IdentifiedCurve:
     """Standard error of beta; 0 at dP0."""
 
     def __post_init__(self) -> None:
-        count = len(self.u_V)
-        if not count or len(self.u_se_V) != count or len(self.dp_MPa) not in (0, count):
+        lengths = {len(self.u_V), len(self.u_se_V), *((len(self.dp_MPa),) if self.dp_MPa else ())}
+        if len(lengths) > 1 or not self.u_V or not len(self.beta) == len(self.beta_se) == len(self.dp_MPa):
             raise RuleError(
-                f"{count} identified thresholds stand beside {len(self.u_se_V)} errors and {len(self.dp_MPa)} pressure "
-                "drops, expected one each"
+                f"{len(self.u_V)} identified thresholds stand beside {len(self.u_se_V)} errors, {len(self.beta)} beta "
+                f"and {len(self.dp_MPa)} pressure drops, expected one each"
             )
-        if not len(self.beta) == len(self.beta_se) == len(self.dp_MPa):
-            raise RuleError(
-                f"beta has {len(self.beta)} nodes and {len(self.beta_se)} errors at {len(self.dp_MPa)} pressure drops, "
-                "expected one each"
-            )
-        if any(left >= right for left, right in pairwise(self.dp_MPa)):
-            raise RuleError("the nodes of beta must rise with the pressure drop")

@@ -14,8 +14,6 @@ from dzdesign.identify.valve.recorded_curve import RecordedCurve
 
 #: Standard errors by which closing must lie above opening to be no noise; and V, for a simulation has almost none.
 ORDER_SIGNIFICANCE, ORDER_LEAST_V = 5.0, 1e-3
-#: Of a branch: the thresholds, each with its standard error.
-THRESHOLDS = ("knee", "level", "onset")
 BRANCHES = ("rising", "falling")
 
 StandardError = Annotated[VoltageError | None, Meta(description="Standard error of this threshold.")]
@@ -38,9 +36,6 @@ class TestResult:
     u_knee_rising_V: Voltage | None
     """Knee on opening: the straight part of Q/sqrt(dP), extrapolated to zero flow."""
     u_knee_rising_se_V: StandardError
-    u_level_rising_V: Voltage | None
-    """Level on opening: the command at which the flow reaches the noise level."""
-    u_level_rising_se_V: StandardError
     u_onset_rising_V: Voltage | None
     """Onset on opening, as far as the meter shows it. It is the first flow above the meter's noise, or the tail
     extrapolated to zero, whichever is lower."""
@@ -50,9 +45,6 @@ class TestResult:
     u_knee_falling_V: Voltage | None
     """Knee on closing: the straight part of Q/sqrt(dP), extrapolated to zero flow."""
     u_knee_falling_se_V: StandardError
-    u_level_falling_V: Voltage | None
-    """Level on closing: the command at which the flow reaches the noise level."""
-    u_level_falling_se_V: StandardError
     u_onset_falling_V: Voltage | None
     """Onset on closing: the command of the last flow that the meter shows."""
     u_onset_falling_se_V: StandardError
@@ -101,11 +93,6 @@ class TestResult:
     """Recording conditions. Omitted if they were not kept."""
 
     def __post_init__(self) -> None:
-        for branch in BRANCHES:
-            keys = [f"u_{name}_{branch}_{unit}" for name in THRESHOLDS for unit in ("V", "se_V")]
-            known = {getattr(self, key) is not None for key in (*keys, f"straight_{branch}")}
-            if len(known) > 1:
-                raise RuleError(f"'{self.source}' has some thresholds of its {branch} branch and lacks others")
         errors = [error for error in (self.u_knee_rising_se_V, self.u_knee_falling_se_V) if error is not None]
         if not errors:
             raise RuleError("a test has no knee, neither rising nor falling; expected at least one")

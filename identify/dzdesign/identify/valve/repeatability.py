@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from dzdesign.core.artefact_types import RuleError, quantity
+from dzdesign.core.artefact_types import quantity
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.identify.valve.quantity_types import Voltage, VoltageError
 
@@ -28,15 +28,6 @@ class Repeatability:
     """Standard error of drift_V."""
     no_drift: NoDrift
     """Reason why the model has no drift; empty if it has one."""
-
-    def __post_init__(self) -> None:
-        if (self.origin == "repeats") != (self.degrees_of_freedom is not None):
-            raise RuleError(
-                f"the scatter between ramps is '{self.origin}' and has {self.degrees_of_freedom} degrees of freedom; "
-                "expected them where it was measured on repeats, and null elsewhere"
-            )
-        if not (self.drift_V is None) == (self.drift_se_V is None) == bool(self.no_drift):
-            raise RuleError("the drift, its standard error and the reason that there is none contradict one another")
 
     def in_words(self, units: RecordedUnits) -> str:
         """Return by how much the guarded threshold scatters from ramp to ramp, and drifts, and how that is known."""
