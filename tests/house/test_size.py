@@ -13,7 +13,7 @@ from tests.support.paths import ROOT
 ROOM_SIZES = {
     "core": (2767, 15, 0),
     "derivation": (4704, 28, 325),
-    "identify": (16729, 117, 1064),
+    "identify": (16469, 96, 1064),
     "assess": (1687, 13, 0),
     "design": (6611, 30, 0),
     "codegen": (7422, 50, 7308),

@@ -12,7 +12,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.identify.fit.ramp_model import Ramps
 from dzdesign.identify.fit.scatter import measure_scatter
 from dzdesign.identify.fitting.guarded_thresholds import Trend, find_trend
-from dzdesign.identify.knees.meter_floor import find_meter_floor
+from dzdesign.identify.knees.meter import find_meter_floor
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.command import sweep_direction
 from dzdesign.identify.ramps.splitting import split_ramps

@@ -11,7 +11,7 @@ from dzdesign.assess.flow_curves import FlowCurve, PressureCurves
 from dzdesign.core.artefact_types import RuleError, quantity
 from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.knees.curve_thinning import TOLERANCE, decimals_of, evenly_spaced, fewest_points
-from dzdesign.identify.valve.ramp_conditions import RampConditions
+from dzdesign.identify.valve.ramp_result import RampConditions
 
 #: Largest command in percent of full command, and largest flow, that a file may state.
 LARGEST_PERCENT, LARGEST_FLOW = 1e4, 1e6

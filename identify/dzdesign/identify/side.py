@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -9,7 +10,7 @@ from dzdesign.core.artefact_types import own_result
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits, worded
 from dzdesign.identify.constants import L_MIN, MPA
-from dzdesign.identify.data_quality.low_flow import about_low_flow
+from dzdesign.identify.data_quality.flow_meter import about_low_flow
 from dzdesign.identify.data_quality.side_warnings import find_warnings
 from dzdesign.identify.fit.scatter import Scatter
 from dzdesign.identify.fitting.certifying import Certified, Tested, certify_thresholds
@@ -18,24 +19,39 @@ from dzdesign.identify.fitting.identifying import identify_curve, opening_curve
 from dzdesign.identify.fitting.low_flow import unseen_of_curve, with_low_flow
 from dzdesign.identify.fitting.zero_flow import allowed_at_zero
 from dzdesign.identify.knees.curve_thinning import recorded_curve
-from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
-from dzdesign.identify.knees.knee_table import Knees
+from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests, Knees
 from dzdesign.identify.knees.prepared_tests import describe_tests
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_test import RampTest
-from dzdesign.identify.results import SideIdentification
 from dzdesign.identify.valve.guard_curve import GUARDS, CertifiedCurve, Guard
 from dzdesign.identify.valve.low_flow import LowFlow
-from dzdesign.identify.valve.ramp_conditions import conditions_of
-from dzdesign.identify.valve.ramp_result import BRANCHES, TestResult
+from dzdesign.identify.valve.model import ValveModel, Warning_
+from dzdesign.identify.valve.ramp_result import BRANCHES, TestResult, conditions_of
 from dzdesign.identify.valve.recorded_drop import RecordedDrop, drop_in_words
-from dzdesign.identify.valve.repeatability import NoDrift, Repeatability
-from dzdesign.identify.valve.side_model import BoundsBasis, Reference, SideModel
+from dzdesign.identify.valve.side_model import BoundsBasis, NoDrift, Reference, Repeatability, SideModel
 
 #: dP0 names the tested pressure drop within this share of it.
 REFERENCE_TOLERANCE = 0.1
 #: dP0 of the paper, taken where the user names none: the test nearest to it.
 PAPER_DP0 = 1 * MPA
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SideIdentification:
+    """What was found about one side, and what it was found from."""
+
+    model: SideModel
+    described: DescribedTests
+    knees: Knees
+    warnings: tuple[Warning_, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Identification:
+    """The model of a valve, and per side what it was found from."""
+
+    model: ValveModel
+    sides: dict[str, SideIdentification]
 
 
 @own_result()

@@ -11,7 +11,7 @@ from bench_plant import commanded, lagged, ramp
 from dzdesign.identify.fitting import guarded_thresholds, soft_edges
 from dzdesign.identify.fitting.soft_edges import EdgeAverages, Softness, fit_edges
 from dzdesign.identify.identification import identify
-from dzdesign.identify.knees import meter_floor
+from dzdesign.identify.knees import meter
 from dzdesign.identify.options import IdentifyOptions
 
 COUNTS = {
@@ -88,8 +88,8 @@ class TestFloorOfAllRamps:
         assert valve.positive.certificate.level_L_min >= 0.3
 
     def test_ramps_one_by_one_do_not_show_it(self, monkeypatch):
-        gap = meter_floor._gap
-        monkeypatch.setattr(meter_floor, "_gap", lambda parts, u_max: gap(parts, u_max) if len(parts) < 2 else 0.0)
+        gap = meter._gap
+        monkeypatch.setattr(meter, "_gap", lambda parts, u_max: gap(parts, u_max) if len(parts) < 2 else 0.0)
         assert self.identified().positive.certificate.level_L_min < 0.3
 
     def test_a_meter_without_a_floor_has_none(self):

@@ -1,14 +1,16 @@
 """What is weak in the flow meter's readings: its steps, its lag, its noise, what it reads at rest."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from dzdesign.core.recorded_units import worded
 from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.data_quality.catalogue import warn
+from dzdesign.identify.fitting.low_flow import Lowered, unseen_of_curve
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
 from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.valve.guard_curve import Guard
 from dzdesign.identify.valve.model import Warning_
 from dzdesign.identify.valve.side_model import PROMISED, SideModel
 
@@ -24,6 +26,8 @@ COARSE_STEP = 5e-4
 SMALL_SHIFT = 5e-5
 #: Readings a level, from which a flow is one of steps.
 READINGS_A_LEVEL = 5
+#: Times the level, the flow of the reading that a message asks for.
+ASKED = 2.0
 
 
 def about_the_meter(side: SideModel, group: DescribedTests, options: IdentifyOptions) -> Iterator[Warning_]:
@@ -143,3 +147,33 @@ def _about_lag_and_order(side: SideModel, group: DescribedTests) -> Iterator[War
         longer_s = (closes - opens) / (opening + closing)
         if longer_s > lag.shorter:
             yield warn("lag-contradicted", test.source, "branches", lag_s=lag.seconds, longer_s=longer_s)
+
+
+def about_low_flow(side: SideModel, lowered: Mapping[Guard, Lowered]) -> Iterator[Warning_]:
+    """Yield the warnings about the readings of one side: thresholds that were lowered, and tests without a reading."""
+    for guard, each in lowered.items():
+        yield warn(
+            "low-flow", each.by.source, "lowered",
+            guard=guard, depth_mV=1e3 * each.depth, flow_L_min=each.by.at_least_L_min, u_V=each.by.u_V,
+            dp_MPa=each.by.dp_MPa,
+        )  # fmt: skip
+    if not side.low_flow:
+        return
+    guard, level = side.certificate.guard, side.certificate.level_L_min
+    unseen = unseen_of_curve(side.low_flow, guard, side.curve, level)
+    if unseen.unconfirmed:
+        middle = len(side.tests) // 2
+        recorded = side.tests[middle].recorded
+        shown = recorded.closing if guard == "closing" else recorded.opening
+        yield warn(
+            "low-flow", None, "unconfirmed",
+            branch=guard, level_L_min=level, flow_L_min=ASKED * level, dp_MPa=side.curve.dp_MPa[middle],
+            u_V=shown.command_at(ASKED * level) or shown.u_V[-1],
+        )  # fmt: skip
+    if unseen.missing and not unseen.unconfirmed:
+        first = unseen.missing[0]
+        yield warn(
+            "low-flow", None, "short",
+            count=len(unseen.missing), tests=len(side.tests), branch=guard, dp_MPa=side.curve.dp_MPa[first],
+            u_V=side.curve.u_threshold_V[first], level_L_min=level,
+        )  # fmt: skip

@@ -22,9 +22,8 @@ from dzdesign.identify.fit.scatter import Scatter
 from dzdesign.identify.fitting.guarded_thresholds import GuardedThreshold
 from dzdesign.identify.knees.between_ramps import DECIMALS
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.valve.above_tests import AboveTests
 from dzdesign.identify.valve.bound_proof import BoundProof
-from dzdesign.identify.valve.guard_curve import CertifiedCurve, CurvePremise, Guard, PremiseCheck
+from dzdesign.identify.valve.guard_curve import AboveTests, CertifiedCurve, CurvePremise, Guard, PremiseCheck
 from dzdesign.identify.valve.quantity_types import LARGEST_BETA
 
 #: The premise of each class, as valve.json names it.

@@ -17,8 +17,7 @@ from dzdesign.identify.fit.scatter import Scatter, measure_scatter
 from dzdesign.identify.fitting.soft_edges import find_softness, fit_edge_shapes
 from dzdesign.identify.fitting.zero_flow import find_zero_flow, student_errors
 from dzdesign.identify.knees.between_ramps import DECIMALS
-from dzdesign.identify.knees.described_tests import DescribedTests
-from dzdesign.identify.knees.knee_table import Knees
+from dzdesign.identify.knees.described_tests import DescribedTests, Knees
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.valve.guard_curve import Guard
 
@@ -182,7 +181,7 @@ def _by_ramps(
     """
     between, groups = group.between(column), group.between(column).checks.groups
     # One lag of the meter moves all tests the same way.
-    shared = _floor(found.lag_budget.min())
+    shared = _floor(float(found.lag_budget.min()))
     errors = student_errors(options, found.value.size)
     statistical = lower_bounds(found.value, between.variance_of_next(), errors, 0.0)
     budget = np.maximum(statistical - found.bound - shared, 0.0)
@@ -198,7 +197,7 @@ def _by_ramps(
 
 
 def _floor(value: float) -> float:
-    return math.floor(value * 10**DECIMALS) / 10**DECIMALS
+    return float(math.floor(value * 10**DECIMALS)) / 10**DECIMALS
 
 
 def _ceil(values: np.ndarray | float) -> np.ndarray:
@@ -226,13 +225,14 @@ def find_trend(scatter: Scatter, test: np.ndarray, extra_se: np.ndarray, *, u_ma
     from scipy.special import stdtr
 
     ramps, test = scatter.model.ramps, test[scatter.kept]
-    dp, clock = ramps.dp_MPa, ramps.clock
+    dp = ramps.dp_MPa
     if not np.ptp(dp) > 0:
         return Trend(direction="flat", change=math.nan, change_se=math.nan, p_value=math.nan)
+    clock = [ramps.clock] if scatter.model.drift and ramps.clock is not None else []
     # Generalised least squares: what a test's threshold is uncertain by beyond its ramps, these share.
     covariance = np.diag(scatter_of_ramps(scatter) + (FINEST_ERROR * u_max) ** 2)
     covariance += np.where(test[:, None] == test, extra_se[test] ** 2, 0.0)
-    line = np.column_stack([np.ones_like(dp), (dp - dp.min()) / np.ptp(dp), *([clock] if scatter.model.drift else [])])
+    line = np.column_stack([np.ones_like(dp), (dp - dp.min()) / np.ptp(dp), *clock])
     weighted = np.linalg.solve(covariance, line).T
     of_line = np.linalg.inv(weighted @ line)
     change, change_se = float((of_line @ weighted @ ramps.y)[1]), math.sqrt(float(of_line[1, 1]))
@@ -300,7 +300,7 @@ def _mean_of(group: DescribedTests, opening: GuardedThreshold, closing: GuardedT
         names = tuple(item.test.source for item in group.tests)
         return GuardedThreshold(threshold=threshold, ramps=ramps, test=rows, sources=names, least_sd=least_sd)
     # The lag moves the branches against each other: of what both allow for it only their difference is left.
-    shared = _floor(threshold.lag_budget.min())
+    shared = _floor(float(threshold.lag_budget.min()))
     credit = (opening.threshold.lag_budget + closing.threshold.lag_budget) / 2 - threshold.lag_budget
     credit = credit + shared - (up.shared + down.shared) / 2
     test = closing.test[falling]

@@ -10,12 +10,11 @@ from dzdesign.identify.fit.curve_class import CurveClass
 from dzdesign.identify.fit.estimate import covariance_of_curve, estimate_side
 from dzdesign.identify.fit.scatter import Scatter
 from dzdesign.identify.fitting.guarded_thresholds import FINEST_ERROR
-from dzdesign.identify.knees.branch_shape import BranchShape
-from dzdesign.identify.knees.described_tests import DescribedTests
-from dzdesign.identify.knees.knee_table import Knees
+from dzdesign.identify.knees.described_tests import DescribedTests, Knees
+from dzdesign.identify.knees.gated_line import BranchShape
 from dzdesign.identify.knees.profile import read_at_top
 from dzdesign.identify.valve.guard_curve import CertifiedCurve, OpeningCurve
-from dzdesign.identify.valve.identified_curve import IDENTIFIED, IdentifiedCurve
+from dzdesign.identify.valve.side_model import IDENTIFIED, IdentifiedCurve
 
 #: Samples at this share of the largest command and above give the largest flow.
 TOP = 0.98

@@ -19,8 +19,8 @@ from dzdesign.identify.constants import L_MIN, MPA
 from dzdesign.identify.fitting.guarded_thresholds import GuardedThreshold, Guarding
 from dzdesign.identify.fitting.zero_flow import allowed_at_zero
 from dzdesign.identify.knees.between_ramps import DECIMALS
-from dzdesign.identify.knees.branch_shape import BranchShape
 from dzdesign.identify.knees.described_tests import DescribedTests
+from dzdesign.identify.knees.gated_line import BranchShape
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.valve.guard_curve import CertifiedCurve, Guard
 from dzdesign.identify.valve.low_flow import IN_WORDS, SAME_PRESSURE, Branch, LowFlow

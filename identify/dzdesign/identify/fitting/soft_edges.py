@@ -16,10 +16,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dzdesign.identify.knees.branch_shape import BranchShape
-from dzdesign.identify.knees.gated_line import GATE
+from dzdesign.identify.knees.gated_line import GATE, BranchShape
 from dzdesign.identify.knees.line_fitting import DEGREES_OF_FREEDOM
-from dzdesign.identify.knees.meter_lag import MeterLag
+from dzdesign.identify.knees.meter import MeterLag
 
 #: Shares of the flow gain, and widths over u_max, that the first part may have.
 SHARES, WIDTHS = np.array([0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]), np.geomspace(3e-3, 0.2, 11)

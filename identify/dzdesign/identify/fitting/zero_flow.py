@@ -20,10 +20,9 @@ from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import worded
 from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.fit.scatter import LEAST_DEGREES
-from dzdesign.identify.knees.branch_shape import BranchShape
-from dzdesign.identify.knees.dead_zone import FEWEST, SHUT_TO
+from dzdesign.identify.knees.characteristic import FEWEST, SHUT_TO
 from dzdesign.identify.knees.described_tests import DescribedTests
-from dzdesign.identify.knees.gated_line import GATE, fit_line
+from dzdesign.identify.knees.gated_line import GATE, BranchShape, fit_line
 from dzdesign.identify.knees.line_fitting import DEGREES_OF_FREEDOM
 from dzdesign.identify.knees.profile import crossing
 from dzdesign.identify.options import IdentifyOptions

@@ -16,9 +16,8 @@ import numpy as np
 from dzdesign.identify.constants import REFUSED
 from dzdesign.identify.fit.ramp_model import RampModel, Ramps, fit_ramp_model
 from dzdesign.identify.fit.scatter import Scatter, measure_scatter
-from dzdesign.identify.knees.branch_shape import BranchShape
-from dzdesign.identify.knees.gated_line import fit_line
-from dzdesign.identify.knees.least_noise import least_noise, least_step
+from dzdesign.identify.knees.gated_line import BranchShape, fit_line
+from dzdesign.identify.knees.noise import least_noise, least_step
 from dzdesign.identify.options import IdentifyOptions
 
 #: A ramp tells its own knee with at least so many samples, over this share of the straight part.

@@ -10,13 +10,10 @@ from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import worded
 from dzdesign.identify.constants import FULL_SWEEP, L_MIN, MPA, SMALLEST_DP, ANYWHERE_MPa
 from dzdesign.identify.knees.between_ramps import BetweenRamps, compare_ramps, knees_of_ramps
-from dzdesign.identify.knees.branch_shape import BranchShape
 from dzdesign.identify.knees.characteristic import describe_branches
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
-from dzdesign.identify.knees.gated_line import prepare_branch
-from dzdesign.identify.knees.meter_floor import find_meter_floor, known_floor
-from dzdesign.identify.knees.meter_lag import MeterLag, find_lag
-from dzdesign.identify.knees.mixed_branches import refuse_mixed_branches
+from dzdesign.identify.knees.gated_line import BranchShape, prepare_branch
+from dzdesign.identify.knees.meter import MeterLag, find_lag, find_meter_floor, known_floor
 from dzdesign.identify.knees.profile import largest_at_top
 from dzdesign.identify.knees.readings_at_rest import find_rest_flows, hidden_zero
 from dzdesign.identify.knees.refusals import (
@@ -26,6 +23,7 @@ from dzdesign.identify.knees.refusals import (
     refuse_a_wrong_pressure,
     refuse_an_impossible_knee,
     refuse_an_open_valve,
+    refuse_mixed_branches,
     refuse_two_directions,
     refuse_two_signs_of_flow,
 )
@@ -72,7 +70,7 @@ def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> Descr
     known = known_floor(tests, options)
     floor = found_floor(pooled, options) if known is None else known
     described = _described(pooled, floor, lag, options)
-    refuse_mixed_branches(described, tests)
+    refuse_mixed_branches(described)
     between = [_between_ramps(described, column, options) for column in (0, 1)]
     if any(np.any(shift != 0) for found in between if found for shift in found.shifts):
         moved = [_with_ramps_together(item, row, between) for row, item in enumerate(pooled)]

@@ -7,6 +7,7 @@ import numpy as np
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import worded
 from dzdesign.identify.constants import L_MIN, LARGEST_DP, MPA, SMALLEST_DP
+from dzdesign.identify.knees.described_tests import DescribedTest
 from dzdesign.identify.knees.gated_line import PreparedBranch
 from dzdesign.identify.knees.noise import robust_sigma
 from dzdesign.identify.knees.profile import crossing, largest_flow
@@ -248,4 +249,50 @@ def refuse_an_impossible_knee(branch: Branch, knee: float, source: str, u_max: f
             lowest=lowest,
             highest=highest,
         )
+    )
+
+
+def refuse_mixed_branches(described: Sequence[DescribedTest]) -> None:
+    """Refuse tests of which some have a branch that others lack: they can't be compared.
+
+    A test's branch may be a test of its own, at the pressure drop that the pump had come up to by then.
+    """
+    for column, name in ((0, "rising"), (1, "falling")):
+        lacking = [item for item in described if item.shapes[column] is None]
+        if not lacking or len(lacking) == len(described):
+            continue
+        item, remedy = lacking[0], "record every pressure drop up and down, or leave that file out"
+        remedy = _pressure_on_its_way(item, column, described) or remedy
+        raise InputError(
+            worded(
+                "'{source}' has no {name} branch while other ramp tests have one; {remedy}",
+                source=item.test.source,
+                name=name,
+                remedy=remedy,
+            )
+        )
+
+
+def _pressure_on_its_way(item: DescribedTest, column: int, described: Sequence[DescribedTest]) -> str | None:
+    """Return what to say where the branch that a test lacks was run at another pressure drop, in the same recording."""
+    other = next(
+        (
+            each
+            for each in described
+            if each is not item
+            and set(each.files) & set(item.files)
+            and each.shapes[column] is not None
+            and each.shapes[1 - column] is None
+        ),
+        None,
+    )
+    if other is None or other.dp is None or item.dp is None:
+        return None
+    source = next(file for file in item.files if file in other.files)[0]
+    return worded(
+        "in '{source}' the pressure drop was {dp:.3g #MPa} on that branch, and {level:.3g MPa} on the other one, so it "
+        "is another test. Start the ramp after the pressure has settled and record again, or leave that file out",
+        source=source,
+        dp=other.dp / MPA,
+        level=item.dp / MPA,
     )

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, get_args
+from typing import Annotated, Literal, get_args
 
 import numpy as np
 from msgspec import Meta
@@ -11,7 +11,6 @@ from dzdesign.core.artefact_types import RuleError, quantity
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.identify.constants import Direction
 from dzdesign.identify.valve.guard_curve import GUARDS, CertifiedCurve, Guard, OpeningCurve
-from dzdesign.identify.valve.identified_curve import IDENTIFIED, IdentifiedCurve
 from dzdesign.identify.valve.low_flow import LowFlow
 from dzdesign.identify.valve.quantity_types import (
     Flow,
@@ -24,11 +23,75 @@ from dzdesign.identify.valve.quantity_types import (
 )
 from dzdesign.identify.valve.ramp_result import TestResult
 from dzdesign.identify.valve.recorded_drop import RecordedDrop
-from dzdesign.identify.valve.repeatability import Repeatability
 
+Origin = Literal["repeats", "declared", "assumed"]
+NoDrift = Literal["", "one pressure drop", "order unknown", "order of pressure"]
+#: The branches, by what the valve does on them.
+IDENTIFIED = ("closing", "opening")
 #: What bounds answer for over the declared zero flow, above which it is said to be more.
 PROMISED = 1.001
 DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class IdentifiedCurve:
+    """Thresholds (knees) of one branch by the fit of the side, and their ratio of Eq. (5); one entry for each test."""
+
+    dp_MPa: Annotated[tuple[PressureDrop, ...], quantity("MPa")]
+    """Tested pressure drops; empty if the pressure drop is unknown."""
+    u_V: Annotated[tuple[Voltage, ...], quantity("V")]
+    """Threshold u_min at each test: the knee as fitted under the premise."""
+    u_se_V: Annotated[tuple[VoltageError, ...], quantity("V")]
+    """Standard error of the threshold by noise, scatter from ramp to ramp, and the width of the straight part."""
+    beta: Annotated[tuple[IdentifiedRatio, ...], quantity("1")]
+    """Threshold relative to that at dP0 (Eq. 5); empty if the pressure drop is unknown."""
+    beta_se: Annotated[tuple[RatioError, ...], quantity("1")]
+    """Standard error of beta; 0 at dP0."""
+
+    def __post_init__(self) -> None:
+        lengths = {len(self.u_V), len(self.u_se_V), *((len(self.dp_MPa),) if self.dp_MPa else ())}
+        if len(lengths) > 1 or not self.u_V or not len(self.beta) == len(self.beta_se) == len(self.dp_MPa):
+            raise RuleError(
+                f"{len(self.u_V)} identified thresholds stand beside {len(self.u_se_V)} errors, {len(self.beta)} beta "
+                f"and {len(self.dp_MPa)} pressure drops, expected one each"
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Repeatability:
+    """Scatter of the guarded threshold from ramp to ramp, and its drift through the series of ramps."""
+
+    sd_V: VoltageError
+    """Standard deviation of the threshold from ramp to ramp."""
+    origin: Origin
+    """Origin of the standard deviation: measured on repeats, declared by --repeatability, or assumed by dzdesign."""
+    degrees_of_freedom: Annotated[float, quantity("1", gt=0, le=1e9)] | None
+    """Degrees of freedom of a measured standard deviation; null if it was not measured."""
+    drift_V: Voltage | None
+    """Change of the threshold from the first ramp of the series to the last; null if the model has no drift. The
+    thresholds refer to the middle of the series, and the bounds hold at both ends."""
+    drift_se_V: VoltageError | None
+    """Standard error of drift_V."""
+    no_drift: NoDrift
+    """Reason why the model has no drift; empty if it has one."""
+
+    def in_words(self, units: RecordedUnits) -> str:
+        """Return by how much the guarded threshold scatters from ramp to ramp, and drifts, and how that is known."""
+        how = {
+            "repeats": f"from repeated ramps, {self.degrees_of_freedom or 0:.0f} degrees of freedom",
+            "declared": "declared",
+            "assumed": "assumed, too few repeated ramps",
+        }
+        drift = (
+            f"drift from the first ramp to the last: {units.number(1e3 * self.drift_V, '+.1f mV')} ± "
+            f"{units.text(1e3 * self.drift_se_V, '.1f mV')}"
+            if self.drift_V is not None and self.drift_se_V is not None
+            else f"no drift in the model ({self.no_drift})"
+        )
+        return (
+            f"standard deviation {units.text(1e3 * self.sd_V, '.1f mV')} ({how[self.origin]}), included in "
+            f"the bounds; {drift}"
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
