@@ -2,6 +2,8 @@
 
 from typing import Literal, get_args
 
+from dzdesign.core.recorded_units import worded
+
 #: What is taken of the threshold between the tests, from the strongest on.
 Premise = Literal["line", "smooth", "monotone"]
 PREMISES: tuple[Premise, ...] = get_args(Premise)
@@ -19,3 +21,10 @@ ANYWHERE_MPa = 1.0
 BIN_WIDTH = 1e-3
 #: A sweep that comes to this share of the largest command is whole: the valve must have opened in it.
 FULL_SWEEP = 0.95
+
+
+class Shown(float):
+    """A quantity in a text, in the units of `shown_in`; ``f"{Shown(low):.2f #V}"`` leaves the unit out."""
+
+    def __format__(self, spec: str) -> str:
+        return worded(f"{{value:{spec}}}", value=float(self))

@@ -9,7 +9,7 @@ import numpy as np
 from dzdesign.core.artefact_types import own_result
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits, worded
-from dzdesign.identify.constants import L_MIN, MPA
+from dzdesign.identify.constants import L_MIN, MPA, Shown
 from dzdesign.identify.data_quality.flow_meter import about_low_flow
 from dzdesign.identify.data_quality.side_warnings import find_warnings
 from dzdesign.identify.fit.scatter import Scatter
@@ -117,7 +117,7 @@ def _reference(described: tuple[DescribedTest, ...], dp0: float | None) -> int:
     dp = np.array([item.dp for item in described])
     index = int(np.argmin(np.abs(np.log(dp / (dp0 or PAPER_DP0)))))
     if dp0 is not None and abs(dp[index] - dp0) > REFERENCE_TOLERANCE * dp0:
-        tested = ", ".join(worded("{dp:.3g #MPa}", dp=value / MPA) for value in dp[:-1])
+        tested = ", ".join(f"{Shown(value / MPA):.3g #MPa}" for value in dp[:-1])
         raise InputError(
             worded(
                 "dP0 = {dp0:g MPa} is not among the tested pressure drops ({tested}{comma}{last:.3g MPa})",

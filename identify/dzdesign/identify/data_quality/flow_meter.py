@@ -4,8 +4,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from dzdesign.core.recorded_units import worded
-from dzdesign.identify.constants import L_MIN
+from dzdesign.identify.constants import L_MIN, Shown
 from dzdesign.identify.data_quality.catalogue import warn
 from dzdesign.identify.fitting.low_flow import Lowered, unseen_of_curve
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
@@ -67,13 +66,13 @@ def _about_the_zero_flow(side: SideModel, group: DescribedTests) -> Iterator[War
     numbers = {"declared_L_min": declared, "allowed_L_min": allowed}
     if max(group.leak) > 0 and max(rest) > declared:
         above = [(test.dp_MPa, flow) for test, flow in zip(side.tests, rest, strict=True) if flow > declared]
-        places = ", ".join(worded("{dp:.3g #MPa}", dp=dp) for dp, _ in above[:-1])
-        flows = ", ".join(worded("{flow:.3g #L/min}", flow=flow) for _, flow in above[:-1])
+        places = ", ".join(f"{Shown(dp):.3g #MPa}" for dp, _ in above[:-1])
+        flows = ", ".join(f"{Shown(flow):.3g #L/min}" for _, flow in above[:-1])
         comma = ", " if len(above) > 1 else ""
         yield warn(
             "zero-flow", worst.source, "leak",
-            leaks=worded("{flows}{comma}{last:.3g L/min}", flows=flows, comma=comma, last=above[-1][1]),
-            pressures=worded("{places}{comma}{last:.3g MPa}", places=places, comma=comma, last=above[-1][0]),
+            leaks=f"{flows}{comma}{Shown(above[-1][1]):.3g L/min}",
+            pressures=f"{places}{comma}{Shown(above[-1][0]):.3g MPa}",
             **numbers,
         )  # fmt: skip
     elif len(side.tests) == 1 and rest[0] > 0:

@@ -7,8 +7,7 @@ import numpy as np
 
 from dzdesign.core.artefact_types import own_result
 from dzdesign.core.errors import InputError, InternalError
-from dzdesign.core.recorded_units import worded
-from dzdesign.identify.constants import MPA, PREMISES, REFUSED, Direction, Premise
+from dzdesign.identify.constants import MPA, PREMISES, REFUSED, Direction, Premise, Shown
 from dzdesign.identify.fit.certificate import ROUNDING_V as ROUNDING
 from dzdesign.identify.fit.certificate import (
     Certificate,
@@ -198,16 +197,13 @@ def _why_none(scatter: Scatter, curves: CurveClass, bound: np.ndarray) -> str:
     ramps, worst = scatter.model.ramps, int(bound.argmin())
     nearest = int(np.argmin(np.abs(ramps.dp_MPa - curves.grid_MPa[worst])))
     budget = ramps.shared + (0.0 if ramps.budget is None else float(ramps.budget[nearest]))
-    known = "" if np.isinf(scatter.degrees) else worded(" (degrees of freedom: {degrees:.0f})", degrees=scatter.degrees)
-    return worded(
-        "the threshold's lower bound is {bound:.3f V}, not above zero. There the threshold is {value:.4g V}, with a "
-        "standard deviation of {sd:.0f mV} from ramp to ramp{known} and a systematic error of up to {budget:.0f mV}; "
-        "record more or slower ramps, leave out one that differs, or check the meter's zero",
-        bound=bound[worst],
-        value=ramps.y[nearest],
-        sd=1e3 * float(np.sqrt(scatter.variance)),
-        known=known,
-        budget=1e3 * budget,
+    known = "" if np.isinf(scatter.degrees) else f" (degrees of freedom: {scatter.degrees:.0f})"
+    return (
+        f"the threshold's lower bound is {Shown(bound[worst]):.3f V}, not above zero. There the threshold is "
+        f"{Shown(ramps.y[nearest]):.4g V}, with a standard deviation of "
+        f"{Shown(1e3 * float(np.sqrt(scatter.variance))):.0f mV} from ramp to ramp{known} and a systematic error of up "
+        f"to {Shown(1e3 * budget):.0f mV}; record more or slower ramps, leave out one that differs, or check the "
+        "meter's zero"
     )
 
 

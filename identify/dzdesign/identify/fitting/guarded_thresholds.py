@@ -11,13 +11,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dzdesign.identify.constants import REFUSED, Direction
-from dzdesign.identify.fit.curve_class import LARGEST_DEGREES, scatter_of_ramps
+from dzdesign.identify.fit.curve_class import scatter_of_ramps
 from dzdesign.identify.fit.ramp_model import Ramps
 from dzdesign.identify.fit.scatter import Scatter, measure_scatter
 from dzdesign.identify.fitting.soft_edges import find_softness, fit_edge_shapes
 from dzdesign.identify.fitting.zero_flow import find_zero_flow, student_errors
 from dzdesign.identify.knees.between_ramps import DECIMALS
 from dzdesign.identify.knees.described_tests import DescribedTests, Knees
+from dzdesign.identify.knees.line_fitting import DEGREES_OF_FREEDOM
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.valve.guard_curve import Guard
 
@@ -29,6 +30,8 @@ SOFT_SIGNIFICANCE = 3.5
 TREND_SIGNIFICANCE = 0.01
 #: Share of the error probability that bounds of single tests leave to others.
 SHARE_OF_OTHERS = 0.25
+#: Smallest share of the noise in a variance that is counted in its degrees of freedom.
+SMALLEST_SHARE = 1e-3
 #: Errors below this share of u_max weigh alike: an exact table has none.
 FINEST_ERROR = 1e-5
 
@@ -79,9 +82,7 @@ class GuardedThreshold:
 class Guarding:
     """All that one side's tests say of what may be guarded."""
 
-    #: Branch that is guarded by default: 0 rising, 1 falling.
-    column: int
-    #: How its guarded threshold runs with the pressure drop.
+    #: How the threshold that is guarded by default runs with the pressure drop.
     trend: Trend
     knees: Knees
     #: Of every guard that the branches allow, the default one first.
@@ -109,7 +110,7 @@ def guard_thresholds(group: DescribedTests, knees: Knees, options: IdentifyOptio
         default.scatter(options), default.test, default.threshold.se,
         u_max=options.u_max, budget=systematic_change(group, column, options),
     )  # fmt: skip
-    return Guarding(column=column, trend=trend, knees=knees, thresholds=thresholds)
+    return Guarding(trend=trend, knees=knees, thresholds=thresholds)
 
 
 def bound_threshold(group: DescribedTests, knees: Knees, column: int, options: IdentifyOptions) -> Threshold:
@@ -229,14 +230,18 @@ def find_trend(scatter: Scatter, test: np.ndarray, extra_se: np.ndarray, *, u_ma
     if not np.ptp(dp) > 0:
         return Trend(direction="flat", change=math.nan, change_se=math.nan, p_value=math.nan)
     clock = [ramps.clock] if scatter.model.drift and ramps.clock is not None else []
-    # Generalised least squares: what a test's threshold is uncertain by beyond its ramps, these share.
-    covariance = np.diag(scatter_of_ramps(scatter) + (FINEST_ERROR * u_max) ** 2)
+    # Generalised least squares: each ramp has its own noise; what is uncertain of a test beyond that, its ramps share.
+    of_valve = np.maximum(scatter_of_ramps(scatter) - scatter.noise, 0.0)
+    covariance = np.diag(of_valve + ramps.se**2 + (FINEST_ERROR * u_max) ** 2)
     covariance += np.where(test[:, None] == test, extra_se[test] ** 2, 0.0)
     line = np.column_stack([np.ones_like(dp), (dp - dp.min()) / np.ptp(dp), *clock])
     weighted = np.linalg.solve(covariance, line).T
     of_line = np.linalg.inv(weighted @ line)
     change, change_se = float((of_line @ weighted @ ramps.y)[1]), math.sqrt(float(of_line[1, 1]))
-    p_value = float(2 * stdtr(min(scatter.degrees, LARGEST_DEGREES), -abs(change) / change_se))
+    # What is not measured on repeats is known but for the ramps' noise, which blocks of residuals tell.
+    known = DEGREES_OF_FREEDOM / max(1 - scatter.share, SMALLEST_SHARE) ** 2
+    degrees = scatter.degrees if scatter.origin == "repeats" else known
+    p_value = float(2 * stdtr(degrees, -abs(change) / change_se))
     flat = abs(change) < budget or p_value > TREND_SIGNIFICANCE
     direction: Direction = "flat" if flat else "decreasing" if change < 0 else "increasing"
     return Trend(direction=direction, change=change, change_se=change_se, p_value=p_value)

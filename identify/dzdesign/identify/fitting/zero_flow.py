@@ -17,8 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.core.recorded_units import worded
-from dzdesign.identify.constants import L_MIN
+from dzdesign.identify.constants import L_MIN, Shown
 from dzdesign.identify.fit.scatter import LEAST_DEGREES
 from dzdesign.identify.knees.characteristic import FEWEST, SHUT_TO
 from dzdesign.identify.knees.described_tests import DescribedTests
@@ -69,14 +68,9 @@ def refuse_a_large_zero_flow(group: DescribedTests, options: IdentifyOptions) ->
     least = min(group.tests, key=lambda item: item.q_max)
     if options.zero_flow >= options.knee_window[0] * least.q_max:
         raise InputError(
-            worded(
-                "a flow at zero of {flow:.3g L/min} is declared, {share:.0%} of the largest flow of '{source}', "
-                "expected less than {most:.0%}: above, the valve is open. Declare what the machine may leak at rest",
-                flow=options.zero_flow / L_MIN,
-                share=options.zero_flow / least.q_max,
-                source=least.test.source,
-                most=options.knee_window[0],
-            )
+            f"a flow at zero of {Shown(options.zero_flow / L_MIN):.3g L/min} is declared, "
+            f"{options.zero_flow / least.q_max:.0%} of the largest flow of '{least.test.source}', expected less than "
+            f"{options.knee_window[0]:.0%}: above, the valve is open. Declare what the machine may leak at rest"
         )
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import worded
+from dzdesign.identify.constants import Shown
 from dzdesign.identify.knees.gated_line import GATE, GatedLine, PreparedBranch, fit_line
 from dzdesign.identify.knees.noise import Roughness, measure_roughness
 from dzdesign.identify.knees.profile import crossing
@@ -115,17 +116,10 @@ def _refuse_no_line(u: np.ndarray, window: tuple[float, float], floor: float, so
     """Refuse samples that hold no straight line: too few above the meter's floor, or all at one command."""
     if u.size < FEWEST or np.ptp(u) == 0:
         raise InputError(
-            worded(
-                "'{source}': {count} samples at {levels} levels of the command lie between {low:.0%} and {high:.0%} of "
-                "the largest flow and above half the meter's floor of {floor:.3g L/min}, expected at least 5 at 2 "
-                "levels; record a slower ramp or more levels, or correct --meter-floor",
-                source=source,
-                count=u.size,
-                levels=np.unique(u).size,
-                low=window[0],
-                high=window[1],
-                floor=floor * 6e4,
-            )
+            f"'{source}': {u.size} samples at {np.unique(u).size} levels of the command lie between {window[0]:.0%} "
+            f"and {window[1]:.0%} of the largest flow and above half the meter's floor of "
+            f"{Shown(floor * 6e4):.3g L/min}, expected at least 5 at 2 levels; record a slower ramp or more levels, "
+            "or correct --meter-floor"
         )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import worded
-from dzdesign.identify.constants import FULL_SWEEP, L_MIN, MPA, SMALLEST_DP, ANYWHERE_MPa
+from dzdesign.identify.constants import FULL_SWEEP, L_MIN, MPA, SMALLEST_DP, ANYWHERE_MPa, Shown
 from dzdesign.identify.knees.between_ramps import BetweenRamps, compare_ramps, knees_of_ramps
 from dzdesign.identify.knees.characteristic import describe_branches
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
@@ -141,15 +141,9 @@ def _refuse_what_has_no_pressure(ramp: Ramp, u_max: float) -> None:
 
 def _no_ramp(test: RampTest) -> InputError:
     return InputError(
-        worded(
-            "'{source}' holds no ramp of the command from near zero up: it runs from {low:.2f #V} to {high:.2f V}, "
-            "expected a sweep over half of the command at least, without jumps; record it so, from below the threshold"
-            "{share}",
-            source=test.source,
-            low=test.u.min(),
-            high=test.u.max(),
-            share=_if_it_is_a_share(test),
-        )
+        f"'{test.source}' holds no ramp of the command from near zero up: it runs from {Shown(test.u.min()):.2f #V} "
+        f"to {Shown(test.u.max()):.2f V}, expected a sweep over half of the command at least, without jumps; record "
+        f"it so, from below the threshold{_if_it_is_a_share(test)}"
     )
 
 

@@ -10,6 +10,7 @@ from msgspec import Meta
 from dzdesign.core.artefact_types import RuleError, quantity
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.identify.constants import Direction
+from dzdesign.identify.fit.scatter import Origin
 from dzdesign.identify.valve.guard_curve import GUARDS, CertifiedCurve, Guard, OpeningCurve
 from dzdesign.identify.valve.low_flow import LowFlow
 from dzdesign.identify.valve.quantity_types import (
@@ -24,7 +25,6 @@ from dzdesign.identify.valve.quantity_types import (
 from dzdesign.identify.valve.ramp_result import TestResult
 from dzdesign.identify.valve.recorded_drop import RecordedDrop
 
-Origin = Literal["repeats", "declared", "assumed"]
 NoDrift = Literal["", "one pressure drop", "order unknown", "order of pressure"]
 #: The branches, by what the valve does on them.
 IDENTIFIED = ("closing", "opening")
