@@ -16,7 +16,7 @@ from dzdesign.design.options import DesignOptions
 from dzdesign.example import example_folder
 from dzdesign.identify.identification import identify_sides
 from dzdesign.identify.reading.ramp_files import read_ramp_file
-from dzdesign.identify.results import Identification
+from dzdesign.identify.side import Identification
 from dzdesign.identify.valve.side_model import SideModel
 from dzdesign.verify.closed_loop.loop import ClosedLoop, LoopRun, RampSequence
 from dzdesign.verify.closed_loop.plant import Plant, read_plant

@@ -40,12 +40,12 @@ def thresholds(example: Example) -> "Figure":
     item, test = side.described.tests[AT_1_MPA], side.model.tests[AT_1_MPA]
     level = side.model.certificate.level_L_min
     names = ("opening (rising command)", "closing (falling command)")
-    opening = test.u_knee_rising_V, test.u_level_rising_V, test.u_onset_rising_V
-    closing = test.u_knee_falling_V, test.u_level_falling_V, test.u_onset_falling_V
-    for panel, shape, (knee, at_level, onset), name, colour in zip(
+    opening = test.u_knee_rising_V, test.u_onset_rising_V
+    closing = test.u_knee_falling_V, test.u_onset_falling_V
+    for panel, shape, (knee, onset), name, colour in zip(
         axes, item.shapes, (opening, closing), names, (BLUE, ORANGE), strict=True
     ):
-        read = shape.prepared.branch
+        read, at_level = shape.prepared.branch, knee + level * L_MIN / shape.slope
         one = read.ramps[0]
         panel.plot(read.u[one], read.q[one] / L_MIN, ".", ms=2, color=GREY, alpha=0.35, label="samples of one ramp")
         u = np.array([knee, 6.3])

@@ -23,7 +23,7 @@ FORBIDDEN = {
 #: not named stands on top.
 FLOORS = {
     "identify": (
-        "constants", "options", "fit", "valve", "reading", "ramps", "knees", "fitting", "data_quality", "results",
+        "constants", "options", "fit", "valve", "reading", "ramps", "knees", "fitting", "data_quality", "side",
         "plots",
     ),
 }  # fmt: skip

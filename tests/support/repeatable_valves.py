@@ -9,7 +9,7 @@ from dataclasses import replace
 from dzdesign.identify import identification
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_test import RampTest
-from dzdesign.identify.results import Identification
+from dzdesign.identify.side import Identification
 from dzdesign.identify.valve.model import ValveModel
 
 REPEATABLE = IdentifyOptions(repeatability=0.0)

@@ -8,7 +8,7 @@ from dzdesign.assess.options import BOTH_SIDES, SETS, AssessOptions, Set, Side
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import RecordedUnits, shown_in, worded
 from dzdesign.identify.constants import MPA
-from dzdesign.identify.knees.meter_lag import MeterLag, find_lag
+from dzdesign.identify.knees.meter import MeterLag, find_lag
 from dzdesign.identify.knees.prepared_tests import found_floor, split_recordings
 from dzdesign.identify.ramps.pooling import SAME_PRESSURE, pool_ramps
 from dzdesign.identify.ramps.sides import tests_of_side

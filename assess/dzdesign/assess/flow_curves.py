@@ -25,7 +25,7 @@ from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.pooling import PooledTest, group_by_pressure, pool_ramps
 from dzdesign.identify.ramps.splitting import Ramp, nominal_dp
 from dzdesign.identify.reading.ramp_test import RampTest
-from dzdesign.identify.valve.ramp_conditions import RampConditions, conditions_of
+from dzdesign.identify.valve.ramp_result import RampConditions, conditions_of
 
 #: Width over u_max of the cells in which a curve is averaged: a mean over some tens of samples.
 CELL = 0.01

@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from dzdesign.identify.options import IdentifyOptions
     from dzdesign.identify.reading.ramp_test import RampTest
     from dzdesign.identify.valve.low_flow import LowFlow
-    from dzdesign.identify.valve.model import ValveModel
-    from dzdesign.identify.valve.stated_options import StatedOptions
+    from dzdesign.identify.valve.model import StatedOptions, ValveModel
 
 #: Arguments that are not an option of the identification itself: what is read and written, and what nothing is made of.
 NOT_STATED = ("ramps", "output", "plots", "record")
@@ -232,7 +231,7 @@ def read_again(options: "StatedOptions", files: Mapping[str, Path]) -> ReadAgain
 
 def stated_options(arguments: IdentifyArguments, order: Sequence[str] = ()) -> "StatedOptions":
     """Return the options as valve.json has them: all but places and the record, those that were not given too."""
-    from dzdesign.identify.valve.stated_options import StatedOptions
+    from dzdesign.identify.valve.model import StatedOptions
 
     texts: dict[str, str] = {}
     tables: dict[str, Mapping[str, str]] = {}

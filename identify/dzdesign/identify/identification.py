@@ -11,19 +11,16 @@ from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import RecordedUnits, shown_in
 from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.data_quality.catalogue import most_serious_first, warn
-from dzdesign.identify.data_quality.clipped_meter import without_clipping
-from dzdesign.identify.data_quality.drop_outs import without_drop_outs
+from dzdesign.identify.data_quality.meter_faults import without_clipping, without_drop_outs
 from dzdesign.identify.data_quality.pressures import about_mixed_pressures, about_single_pressures
-from dzdesign.identify.data_quality.recordings import about_recordings, about_rest
-from dzdesign.identify.data_quality.whole_meter import about_whole_meter
+from dzdesign.identify.data_quality.recordings import about_recordings, about_rest, about_whole_meter
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.command import without_dither
 from dzdesign.identify.ramps.sides import tests_of_side
 from dzdesign.identify.reading.low_flow_readings import readings_of_side
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.reading.scaling import units_of
-from dzdesign.identify.results import Identification, SideIdentification
-from dzdesign.identify.side import identify_side
+from dzdesign.identify.side import Identification, SideIdentification, identify_side
 from dzdesign.identify.valve.low_flow import LowFlow
 from dzdesign.identify.valve.model import DECIMALS, SIDES, Meter, ValveModel, Warning_
 

@@ -2,50 +2,56 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from dzdesign.core.artefact_types import own_result
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits, worded
-from dzdesign.identify.constants import L_MIN, MPA
-from dzdesign.identify.data_quality.low_flow import about_low_flow
+from dzdesign.identify.constants import L_MIN, MPA, Shown
+from dzdesign.identify.data_quality.flow_meter import about_low_flow
 from dzdesign.identify.data_quality.side_warnings import find_warnings
-from dzdesign.identify.fit.scatter import Scatter, measure_scatter
+from dzdesign.identify.fit.scatter import Scatter
 from dzdesign.identify.fitting.certifying import Certified, Tested, certify_thresholds
-from dzdesign.identify.fitting.guarded_thresholds import (
-    GuardedThreshold,
-    Guarding,
-    assumed_sd,
-    departures,
-    guard_thresholds,
-    scatter_of_knees,
-)
-from dzdesign.identify.fitting.identifying import identify_curve
+from dzdesign.identify.fitting.guarded_thresholds import Guarding, departures, guard_thresholds
+from dzdesign.identify.fitting.identifying import identify_curve, opening_curve
 from dzdesign.identify.fitting.low_flow import unseen_of_curve, with_low_flow
-from dzdesign.identify.fitting.opening import opening_curve
-from dzdesign.identify.fitting.unknown_threshold import unknown_threshold
 from dzdesign.identify.fitting.zero_flow import allowed_at_zero
-from dzdesign.identify.knees.between_ramps import FEW_DEGREES
 from dzdesign.identify.knees.curve_thinning import recorded_curve
-from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
-from dzdesign.identify.knees.knee_table import Knees
+from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests, Knees
 from dzdesign.identify.knees.prepared_tests import describe_tests
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_test import RampTest
-from dzdesign.identify.results import SideIdentification
 from dzdesign.identify.valve.guard_curve import GUARDS, CertifiedCurve, Guard
 from dzdesign.identify.valve.low_flow import LowFlow
-from dzdesign.identify.valve.ramp_conditions import conditions_of
-from dzdesign.identify.valve.ramp_result import BRANCHES, TestResult
+from dzdesign.identify.valve.model import ValveModel, Warning_
+from dzdesign.identify.valve.ramp_result import BRANCHES, TestResult, conditions_of
 from dzdesign.identify.valve.recorded_drop import RecordedDrop, drop_in_words
-from dzdesign.identify.valve.repeatability import NoDrift, Repeatability
-from dzdesign.identify.valve.side_model import BoundsBasis, Reference, SideModel
+from dzdesign.identify.valve.side_model import BoundsBasis, NoDrift, Reference, Repeatability, SideModel
 
 #: dP0 names the tested pressure drop within this share of it.
 REFERENCE_TOLERANCE = 0.1
 #: dP0 of the paper, taken where the user names none: the test nearest to it.
 PAPER_DP0 = 1 * MPA
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SideIdentification:
+    """What was found about one side, and what it was found from."""
+
+    model: SideModel
+    described: DescribedTests
+    knees: Knees
+    warnings: tuple[Warning_, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Identification:
+    """The model of a valve, and per side what it was found from."""
+
+    model: ValveModel
+    sides: dict[str, SideIdentification]
 
 
 @own_result()
@@ -98,13 +104,7 @@ def _certify(
         opens_V=np.where(np.isnan(opens), guarding.knees.knee[:, 1], opens),
         options=options,
     )
-    try:
-        return certify_thresholds(guarding.thresholds, tested)
-    except InputError as error:
-        _refuse_unlike_repeats(next(iter(guarding.thresholds.values())), options)
-        if why := unknown_threshold(group, guarding):
-            raise InputError(why) from error
-        raise
+    return certify_thresholds(guarding.thresholds, tested)
 
 
 def _reference(described: tuple[DescribedTest, ...], dp0: float | None) -> int:
@@ -117,7 +117,7 @@ def _reference(described: tuple[DescribedTest, ...], dp0: float | None) -> int:
     dp = np.array([item.dp for item in described])
     index = int(np.argmin(np.abs(np.log(dp / (dp0 or PAPER_DP0)))))
     if dp0 is not None and abs(dp[index] - dp0) > REFERENCE_TOLERANCE * dp0:
-        tested = ", ".join(worded("{dp:.3g #MPa}", dp=value / MPA) for value in dp[:-1])
+        tested = ", ".join(f"{Shown(value / MPA):.3g #MPa}" for value in dp[:-1])
         raise InputError(
             worded(
                 "dP0 = {dp0:g MPa} is not among the tested pressure drops ({tested}{comma}{last:.3g MPa})",
@@ -142,7 +142,7 @@ def _side_model(
     guard = next(iter(certified))
     curves: dict[str, CertifiedCurve] = {name: certified[name].curve for name in GUARDS if name in certified}
     columns = {name: column for name, column in (("closing", 1), ("opening", 0)) if described[0].shapes[column]}
-    branches = {name: scatter_of_knees(group, knees, column, options) for name, column in columns.items()}
+    branches = {name: group.between(column).scatter for name, column in columns.items()}
     joint = identify_curve(group, branches, certified[guard].curves, reference)
     dp0 = described[reference].dp
     several = len(described) > 1
@@ -174,13 +174,12 @@ def _side_model(
             level_L_min=level,
             unseen_below_L_min=unseen,
             zero_flow_L_min=None if options.zero_flow is None else options.zero_flow / L_MIN,
-            repeatability=_repeatability(certified[guard].scatter, group.between(guarding.column).no_drift),
+            repeatability=_repeatability(certified[guard].scatter, len(described)),
         ),
         low_flow=tuple(low_flow),
         identified=joint.curves,
         certified=curves,
         opening_curve=opening_curve(knees, trend.direction, curves, options.u_max),
-        active_constraints=certified[guard].active,
     )
 
 
@@ -190,32 +189,19 @@ def _recorded_drop(described: tuple[DescribedTest, ...]) -> RecordedDrop | None:
     return RecordedDrop(columns=columns, sign=described[0].test.dp_sign) if columns else None
 
 
-def _refuse_unlike_repeats(guarded: GuardedThreshold, options: IdentifyOptions) -> None:
-    """Refuse repeats that differ so much, and are so few, that the next closing may lie anywhere."""
-    declared, assumed = assumed_sd(options)
-    scatter = measure_scatter(guarded.ramps, declared=declared, assumed=assumed, least=guarded.least_sd)
-    if scatter.origin == "repeats" and scatter.degrees < FEW_DEGREES:
-        raise InputError(
-            worded(
-                "repeated ramps at one pressure drop differ too much. Their thresholds scatter by {sd:.0f mV} (one "
-                "standard deviation, degrees of freedom: {degrees:.0f}), so no lower bound lies above zero; record two "
-                "more ramps there, or leave out the one that differs from the rest",
-                sd=1e3 * math.sqrt(scatter.variance),
-                degrees=scatter.degrees,
-            )
-        )
-
-
-def _repeatability(found: Scatter, no_drift: NoDrift) -> Repeatability:
+def _repeatability(found: Scatter, tests: int) -> Repeatability:
     model = found.model
     drift_se = math.sqrt(found.variance * float(np.sum(model.weights[-1] ** 2))) if model.drift else None
+    no_drift: NoDrift = "order unknown" if model.ramps.clock is None else "order of pressure"
+    if model.drift or tests == 1:
+        no_drift = "" if model.drift else "one pressure drop"
     return Repeatability(
         sd_V=math.sqrt(found.variance if found.origin == "repeats" else max(found.variance - found.noise, 0.0)),
         origin=found.origin,
         degrees_of_freedom=found.degrees if found.origin == "repeats" else None,
         drift_V=model.drift_V,
         drift_se_V=drift_se,
-        no_drift="" if model.drift else no_drift or "order of pressure",
+        no_drift=no_drift,
     )
 
 
@@ -270,8 +256,6 @@ def _thresholds(item: DescribedTest, knees: Knees, row: int) -> dict[str, float 
         values |= {
             f"u_knee_{branch}_V": float(knee) if shape else None,
             f"u_knee_{branch}_se_V": float(knee_se) if shape else None,
-            f"u_level_{branch}_V": shape.tail.at_level if shape else None,
-            f"u_level_{branch}_se_V": shape.tail.at_level_se if shape else None,
             f"u_onset_{branch}_V": shape.onset if shape else None,
             f"u_onset_{branch}_se_V": shape.onset_se if shape else None,
         }
@@ -283,15 +267,13 @@ def _not_observable(group: DescribedTests, row: int, units: RecordedUnits) -> di
     reasons = {}
     for direction, shape in zip(BRANCHES, group.tests[row].shapes, strict=True):
         if shape is None:
-            for name in ("knee", "level", "onset"):
+            for name in ("knee", "onset"):
                 reasons[f"u_{name}_{direction}_V"] = f"there is no {direction} branch"
         elif shape.tail.hole:
             low, high = shape.tail.hole
-            for name in ("level", "onset"):
-                reasons[f"u_{name}_{direction}_V"] = (
-                    f"rows are missing {units.span(low, high, '.3f V')}, where the flow begins; the onset's value is "
-                    "the lower end"
-                )
+            reasons[f"u_onset_{direction}_V"] = (
+                f"rows are missing {units.span(low, high, '.3f V')}, where the flow begins; the value is the lower end"
+            )
         elif group.floor > 0:
             least = units.text(group.floor / L_MIN, ".2f L/min")
             reasons[f"u_onset_{direction}_V"] = (

@@ -10,7 +10,7 @@ import pytest
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import write_file
 from dzdesign.core.artefact_types import RuleError
-from dzdesign.identify.valve.above_tests import AboveTests
+from dzdesign.identify.valve.guard_curve import AboveTests
 from tests.support.paths import ROOT
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="shells, devices and limits of Linux")

@@ -9,7 +9,7 @@ import pytest
 
 from dzdesign import api
 from dzdesign.command_line.cli import main
-from dzdesign.identify.data_quality import recording_order
+from dzdesign.identify.data_quality import recordings
 from dzdesign.identify.knees import prepared_tests
 from tests.support.bench_recordings import L_MIN, MPA, Valve, record
 
@@ -194,7 +194,7 @@ class TestSeeded:
         paths = dated(here, SHUFFLED, clock)
         drift_of(*paths)
         assert said()
-        monkeypatch.setattr(recording_order, check, lambda tests: None)
+        monkeypatch.setattr(recordings, check, lambda tests: None)
         drift_of(*paths)
         assert not said()
 

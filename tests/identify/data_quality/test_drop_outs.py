@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dzdesign.identify.data_quality.drop_outs import without_drop_outs
+from dzdesign.identify.data_quality.meter_faults import without_drop_outs
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from tests.support.synthetic import L_MIN, Truth, synthetic_ramp

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from corpus import cases, write
 
-from dzdesign.identify.data_quality.lost_rows import about_lost_rows, find_gaps
+from dzdesign.identify.data_quality.recordings import about_lost_rows, find_gaps
 from dzdesign.identify.reading.ramp_files import read_ramp_file
 from tests.dzdesign.command_line.test_bad_input import csv, ramp
 from tests.support.bench_recordings import Valve, record

@@ -18,7 +18,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.certificate import reach_of_certificate
 from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions, options_of
-from dzdesign.identify.data_quality import knee_errors
+from dzdesign.identify.data_quality import sweeps
 from dzdesign.identify.data_quality.catalogue import catalogue, most_serious_first, warn
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_files import ramp_file_bytes, read_ramp_file
@@ -248,7 +248,7 @@ class TestKneeErrors:
         valve = identify(self.curved(0.5))
         row = valve.positive.tests[0]
         row = replace(row, straight_rising=(0.12, 0.9), u_knee_rising_se_V=1.0)
-        warning = knee_errors._bent(row, 0.1, (0.12, 0.5))
+        warning = sweeps._bent(row, 0.1, (0.12, 0.5))
         wording.of_test(str(warning.text))
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dzdesign.identify.knees.knee_table import Knees
+from dzdesign.identify.knees.described_tests import Knees
 from dzdesign.identify.knees.prepared_tests import describe_tests
 from dzdesign.identify.options import IdentifyOptions
 from tests.support.synthetic import L_MIN, Truth, synthetic_ramp

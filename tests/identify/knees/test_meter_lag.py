@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 from dzdesign.core.errors import InputError
 from dzdesign.core.option_readers import with_tolerance
 from dzdesign.identify.identification import identify
-from dzdesign.identify.knees.meter_lag import LONGEST_UNKNOWN, softness_of_filter
+from dzdesign.identify.knees.meter import LONGEST_UNKNOWN, softness_of_filter
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.stages.identify import IdentifyArguments, identify_options
 from tests.support.bench_recordings import Valve, record

@@ -256,7 +256,7 @@ class TestPressureOnItsWay:
         share = np.clip(test.time / settles_s, 0.01, 1) ** 2
         return dataclasses.replace(test, dp=test.dp * share, q=test.q * np.sqrt(share))
 
-    def test_the_refusal_says_so_and_when_it_settled(self, wording):
+    def test_the_refusal_says_so(self, wording):
         tests = [self.recorded(1.0), self.recorded(4.0)]
         with wording.refusal(InputError):
             identify(tests)

@@ -9,7 +9,7 @@ import pytest
 from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
 from dzdesign.identify import identification
 from dzdesign.identify.constants import L_MIN
-from dzdesign.identify.knees import meter_floor
+from dzdesign.identify.knees import meter
 from dzdesign.identify.ramps import splitting
 from dzdesign.identify.ramps.staircases import find_staircase
 from dzdesign.identify.reading import columns, ramp_files, scaling
@@ -42,7 +42,7 @@ def test_a_staircase_taken_for_a_ramp_is_seen(name, tmp_path, monkeypatch):
 
 
 def test_a_floor_that_levels_hide_is_seen(tmp_path, monkeypatch):
-    monkeypatch.setattr(meter_floor, "floor_of_levels", lambda *_: 0.0)
+    monkeypatch.setattr(meter, "floor_of_levels", lambda *_: 0.0)
     assert "a floor of 0 L/min" in corpus_units.fault_of(CASES["stairs_7"], tmp_path)
 
 

@@ -56,29 +56,6 @@ def test_ramps_that_tell_a_drift_too_may_have_less_than_one_degree_of_freedom(sm
     side_of(document)["certificate"]["repeatability"] |= {"origin": "repeats", "degrees_of_freedom": 0.9}
     assert read(document).positive.certificate.repeatability.degrees_of_freedom == 0.9
 
-class TestPremise:
-    @pytest.mark.parametrize("p_value", [0.009, 0.02])
-    def test_a_premise_that_the_tests_refuse_is_not_taken(self, smooth, p_value):
-        document = deepcopy(smooth)
-        for check in side_of(document)["certified"]["closing"]["premises"]:
-            check["lack_of_fit_p"] = p_value
-        if p_value < 0.01:
-            assert "refuse" in refused(document)
-        else:
-            read(document)
-
-    def test_a_premise_without_its_proof_is_refused(self, smooth):
-        document = deepcopy(smooth)
-        side_of(document)["certified"]["closing"] |= {
-            "premise": "line", "curvature_V_MPa2": None, "curvature_is": None, "premises": []
-        }  # fmt: skip
-        assert "proof" in refused(document)
-
-    def test_an_estimated_curvature_is_none_that_was_declared(self, smooth):
-        document = deepcopy(smooth)
-        side_of(document)["certified"]["closing"]["curvature_is"] = "declared"
-        assert "proof" in refused(document)
-
 
 class TestProof:
     """A bound is what its ramps and multipliers prove, and no more."""
@@ -145,10 +122,6 @@ class TestAboveTheTests:
         raised = list(above["u_lower_V"])
         raised[3] = raised[2] + 1e-3
         assert "not rise" in refused(self.edited(smooth, u_lower_V=raised))
-
-    def test_so_is_one_that_begins_above_the_last_test(self, smooth, above):
-        raised = [above["u_lower_V"][0] + 0.1, *above["u_lower_V"][1:]]
-        assert "begin at the last test" in refused(self.edited(smooth, u_lower_V=raised))
 
     def test_of_a_falling_threshold_that_only_runs_one_way_nothing_is_certified(self):
         assert not side_of(valve_json(curve="monotone"))["certified"]["closing"]["above"]["certified"]

@@ -1,14 +1,15 @@
 """What is weak in the flow meter's readings: its steps, its lag, its noise, what it reads at rest."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from dzdesign.core.recorded_units import worded
-from dzdesign.identify.constants import L_MIN
+from dzdesign.identify.constants import L_MIN, Shown
 from dzdesign.identify.data_quality.catalogue import warn
+from dzdesign.identify.fitting.low_flow import Lowered, unseen_of_curve
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
 from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.valve.guard_curve import Guard
 from dzdesign.identify.valve.model import Warning_
 from dzdesign.identify.valve.side_model import PROMISED, SideModel
 
@@ -24,6 +25,8 @@ COARSE_STEP = 5e-4
 SMALL_SHIFT = 5e-5
 #: Readings a level, from which a flow is one of steps.
 READINGS_A_LEVEL = 5
+#: Times the level, the flow of the reading that a message asks for.
+ASKED = 2.0
 
 
 def about_the_meter(side: SideModel, group: DescribedTests, options: IdentifyOptions) -> Iterator[Warning_]:
@@ -63,13 +66,13 @@ def _about_the_zero_flow(side: SideModel, group: DescribedTests) -> Iterator[War
     numbers = {"declared_L_min": declared, "allowed_L_min": allowed}
     if max(group.leak) > 0 and max(rest) > declared:
         above = [(test.dp_MPa, flow) for test, flow in zip(side.tests, rest, strict=True) if flow > declared]
-        places = ", ".join(worded("{dp:.3g #MPa}", dp=dp) for dp, _ in above[:-1])
-        flows = ", ".join(worded("{flow:.3g #L/min}", flow=flow) for _, flow in above[:-1])
+        places = ", ".join(f"{Shown(dp):.3g #MPa}" for dp, _ in above[:-1])
+        flows = ", ".join(f"{Shown(flow):.3g #L/min}" for _, flow in above[:-1])
         comma = ", " if len(above) > 1 else ""
         yield warn(
             "zero-flow", worst.source, "leak",
-            leaks=worded("{flows}{comma}{last:.3g L/min}", flows=flows, comma=comma, last=above[-1][1]),
-            pressures=worded("{places}{comma}{last:.3g MPa}", places=places, comma=comma, last=above[-1][0]),
+            leaks=f"{flows}{comma}{Shown(above[-1][1]):.3g L/min}",
+            pressures=f"{places}{comma}{Shown(above[-1][0]):.3g MPa}",
             **numbers,
         )  # fmt: skip
     elif len(side.tests) == 1 and rest[0] > 0:
@@ -143,3 +146,33 @@ def _about_lag_and_order(side: SideModel, group: DescribedTests) -> Iterator[War
         longer_s = (closes - opens) / (opening + closing)
         if longer_s > lag.shorter:
             yield warn("lag-contradicted", test.source, "branches", lag_s=lag.seconds, longer_s=longer_s)
+
+
+def about_low_flow(side: SideModel, lowered: Mapping[Guard, Lowered]) -> Iterator[Warning_]:
+    """Yield the warnings about the readings of one side: thresholds that were lowered, and tests without a reading."""
+    for guard, each in lowered.items():
+        yield warn(
+            "low-flow", each.by.source, "lowered",
+            guard=guard, depth_mV=1e3 * each.depth, flow_L_min=each.by.at_least_L_min, u_V=each.by.u_V,
+            dp_MPa=each.by.dp_MPa,
+        )  # fmt: skip
+    if not side.low_flow:
+        return
+    guard, level = side.certificate.guard, side.certificate.level_L_min
+    unseen = unseen_of_curve(side.low_flow, guard, side.curve, level)
+    if unseen.unconfirmed:
+        middle = len(side.tests) // 2
+        recorded = side.tests[middle].recorded
+        shown = recorded.closing if guard == "closing" else recorded.opening
+        yield warn(
+            "low-flow", None, "unconfirmed",
+            branch=guard, level_L_min=level, flow_L_min=ASKED * level, dp_MPa=side.curve.dp_MPa[middle],
+            u_V=shown.command_at(ASKED * level) or shown.u_V[-1],
+        )  # fmt: skip
+    if unseen.missing and not unseen.unconfirmed:
+        first = unseen.missing[0]
+        yield warn(
+            "low-flow", None, "short",
+            count=len(unseen.missing), tests=len(side.tests), branch=guard, dp_MPa=side.curve.dp_MPa[first],
+            u_V=side.curve.u_threshold_V[first], level_L_min=level,
+        )  # fmt: skip

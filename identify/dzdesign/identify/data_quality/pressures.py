@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from dzdesign.core.recorded_units import worded
-from dzdesign.identify.constants import FULL_SWEEP, L_MIN, MPA
+from dzdesign.identify.constants import FULL_SWEEP, L_MIN, MPA, Shown
 from dzdesign.identify.data_quality.catalogue import warn
 from dzdesign.identify.ramps.pooling import SAME_PRESSURE
 from dzdesign.identify.ramps.splitting import SHUT
@@ -81,7 +81,7 @@ def about_a_stuck_sensor(tests: Sequence[RampTest]) -> Iterator[Warning_]:
     claims = claimed_pressures([test.source for test in tests])
     signs: list[str] = []
     if min(flows) > 0 and max(flows) > (1 + SAME_FLOW) * explained**0.5 * min(flows):
-        signs.append(worded("the flows at {u_V:.3g V} differ by {by:.0%}", u_V=top, by=max(flows) / min(flows) - 1))
+        signs.append(f"the flows at {Shown(top):.3g V} differ by {max(flows) / min(flows) - 1:.0%}")
     if claims and max(claims) > (1 + SAME_FLOW) * explained * min(claims):
         signs.append("the files' names say different ones")
     if signs:

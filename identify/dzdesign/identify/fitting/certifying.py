@@ -7,8 +7,7 @@ import numpy as np
 
 from dzdesign.core.artefact_types import own_result
 from dzdesign.core.errors import InputError, InternalError
-from dzdesign.core.recorded_units import worded
-from dzdesign.identify.constants import MPA, PREMISES, REFUSED, Direction, Premise
+from dzdesign.identify.constants import MPA, PREMISES, REFUSED, Direction, Premise, Shown
 from dzdesign.identify.fit.certificate import ROUNDING_V as ROUNDING
 from dzdesign.identify.fit.certificate import (
     Certificate,
@@ -18,12 +17,12 @@ from dzdesign.identify.fit.certificate import (
     running_minimum,
 )
 from dzdesign.identify.fit.curve_class import FEWEST_FOR_BENDS, CurveClass, Kind, find_class, lack_of_fit
-from dzdesign.identify.fit.scatter import Scatter, measure_scatter
-from dzdesign.identify.fitting.guarded_thresholds import DECIMALS, GuardedThreshold, assumed_sd
+from dzdesign.identify.fit.scatter import Scatter
+from dzdesign.identify.fitting.guarded_thresholds import GuardedThreshold
+from dzdesign.identify.knees.between_ramps import DECIMALS
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.valve.above_tests import AboveTests
 from dzdesign.identify.valve.bound_proof import BoundProof
-from dzdesign.identify.valve.guard_curve import CertifiedCurve, CurvePremise, Guard, PremiseCheck
+from dzdesign.identify.valve.guard_curve import AboveTests, CertifiedCurve, CurvePremise, Guard, PremiseCheck
 from dzdesign.identify.valve.quantity_types import LARGEST_BETA
 
 #: The premise of each class, as valve.json names it.
@@ -65,8 +64,6 @@ class Certified:
     refused: PremiseCheck | None
     #: Probability of tests like these if the threshold ran one way; None where they can't tell.
     one_way_p: float | None
-    #: Where the offset lies on the bound, in words.
-    active: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -107,8 +104,7 @@ def _certify(guarded: GuardedThreshold, tested: Tested, *, compared: bool) -> Ce
     `compared` states beside it what the other premises would leave.
     """
     options = tested.options
-    declared, assumed = assumed_sd(options)
-    scatter = measure_scatter(guarded.ramps, declared=declared, assumed=assumed, least=guarded.least_sd)
+    scatter = guarded.scatter(options)
     asked, curvature = _asked(options, scatter), None if options.curvature is None else options.curvature * MPA**2
     refused = None
     if asked is not None:
@@ -136,7 +132,6 @@ def _certify(guarded: GuardedThreshold, tested: Tested, *, compared: bool) -> Ce
         scatter=scatter,
         refused=refused,
         one_way_p=one_way_p,
-        active=_active(bounded),
     )
 
 
@@ -186,13 +181,7 @@ def _bound(scatter: Scatter, asked: Premise | None, curvature: float | None, tes
     bound = np.maximum(np.floor(certificate.bound * 10**DECIMALS - 1) / 10**DECIMALS, LOWEST_V)
     offset = running_minimum(bound, way) - ROUNDING
     if offset.min() <= 0:
-        raise InputError(
-            worded(
-                "the threshold's lower bound is {bound:.3f V}, not above zero: no dead zone can be compensated without "
-                "opening the valve at zero command; check the ramp tests and the meter's zero",
-                bound=bound.min(),
-            )
-        )
+        raise InputError(_why_none(scatter, curves, bound))
     at_dp0 = float(np.interp(tested.dp_MPa[tested.reference], curves.grid_MPa, offset)) if several else offset[0]
     beta = offset / at_dp0
     if beta.max() > LARGEST_BETA:
@@ -201,6 +190,21 @@ def _bound(scatter: Scatter, asked: Premise | None, curvature: float | None, tes
             "than half of that at another pressure drop; give the pressure drop with the largest threshold by --dp0"
         )
     return _Bounded(curves=curves, certificate=certificate, bound=bound, offset=offset)
+
+
+def _why_none(scatter: Scatter, curves: CurveClass, bound: np.ndarray) -> str:
+    """Say why no offset is left: the threshold where its bound is lowest, and what the bound takes off."""
+    ramps, worst = scatter.model.ramps, int(bound.argmin())
+    nearest = int(np.argmin(np.abs(ramps.dp_MPa - curves.grid_MPa[worst])))
+    budget = ramps.shared + (0.0 if ramps.budget is None else float(ramps.budget[nearest]))
+    known = "" if np.isinf(scatter.degrees) else f" (degrees of freedom: {scatter.degrees:.0f})"
+    return (
+        f"the threshold's lower bound is {Shown(bound[worst]):.3f V}, not above zero. There the threshold is "
+        f"{Shown(ramps.y[nearest]):.4g V}, with a standard deviation of "
+        f"{Shown(1e3 * float(np.sqrt(scatter.variance))):.0f mV} from ramp to ramp{known} and a systematic error of up "
+        f"to {Shown(1e3 * budget):.0f mV}; record more or slower ramps, leave out one that differs, or check the "
+        "meter's zero"
+    )
 
 
 def _dead_zone_left(bounded: _Bounded, tested: Tested) -> float:
@@ -228,7 +232,7 @@ def _curve(
     if tested.with_dp and grid.size > 1:
         at_dp0 = np.interp(tested.dp_MPa[tested.reference], grid, bounded.offset)
     smooth = PREMISE_OF[kind] == "smooth"
-    declared, assumed = assumed_sd(tested.options)
+    declared, assumed = tested.options.scatter_V
     return CertifiedCurve(
         premise=PREMISE_OF[kind],
         premises=checks,
@@ -245,7 +249,6 @@ def _curve(
             with_dp=tested.with_dp,
         ),
         u_min0_V=float(at_dp0),
-        offset_dp_MPa=nodes,
         offset_V=tuple(map(float, bounded.offset)),
         above=_above(scatter, bounded, tested),
     )  # fmt: skip
@@ -266,14 +269,3 @@ def _above(scatter: Scatter, bounded: _Bounded, tested: Tested) -> AboveTests | 
     return AboveTests(
         certified=above.certified, dp_MPa=tuple(map(float, nodes)), u_lower_V=tuple(map(float, lower[kept]))
     )
-
-
-def _active(bounded: _Bounded) -> tuple[str, ...]:
-    """Return the stretches of the interval on which the offset lies on the bound, in words."""
-    on_bound = bounded.bound - bounded.offset < 2 * ROUNDING
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], on_bound.astype(int), [0]])))
-    found = []
-    for first, last in zip(edges[::2], edges[1::2] - 1, strict=True):
-        low, high = (f"{bounded.curves.grid_MPa[place]:.3f}" for place in (first, last))
-        found.append(f"offset at {low} MPa" if low == high else f"offset from {low} to {high} MPa")
-    return tuple(found)

@@ -1,19 +1,20 @@
-"""What the data say of both branches' thresholds, and of k x_max, each with its error: no bound."""
+"""What the data say of both branches' thresholds, of where useful flow begins, and of k x_max: no bound."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from dzdesign.identify.constants import MPA
+from dzdesign.identify.constants import MPA, ANYWHERE_MPa, Direction
 from dzdesign.identify.fit.curve_class import CurveClass
 from dzdesign.identify.fit.estimate import covariance_of_curve, estimate_side
 from dzdesign.identify.fit.scatter import Scatter
-from dzdesign.identify.fitting.guarded_thresholds import ANYWHERE_MPa
-from dzdesign.identify.knees.branch_shape import BranchShape
-from dzdesign.identify.knees.described_tests import DescribedTests
+from dzdesign.identify.fitting.guarded_thresholds import FINEST_ERROR
+from dzdesign.identify.knees.described_tests import DescribedTests, Knees
+from dzdesign.identify.knees.gated_line import BranchShape
 from dzdesign.identify.knees.profile import read_at_top
-from dzdesign.identify.valve.identified_curve import IDENTIFIED, IdentifiedCurve
+from dzdesign.identify.valve.guard_curve import CertifiedCurve, OpeningCurve
+from dzdesign.identify.valve.side_model import IDENTIFIED, IdentifiedCurve
 
 #: Samples at this share of the largest command and above give the largest flow.
 TOP = 0.98
@@ -106,3 +107,26 @@ def _slope_error(shape: BranchShape) -> float:
     u = shape.prepared.branch.u[shape.line.kept & ~shape.line.censored]
     squares = max(float(np.sum((u - u.mean()) ** 2)), np.finfo(float).tiny) if u.size else np.inf
     return float(shape.sigma * np.sqrt(shape.variance_inflation / squares))
+
+
+def opening_curve(
+    knees: Knees, direction: Direction, guards: Mapping[str, CertifiedCurve], u_max: float
+) -> OpeningCurve | None:
+    """Return where useful flow begins on opening, from the knees of the rising branch that run one way.
+
+    It must not lie below the curves of the guards. None where dP is unknown, or without a rising branch.
+    """
+    from scipy.optimize import isotonic_regression
+
+    dp = next(iter(guards.values())).dp_MPa
+    knee, se = knees.knee[:, 0], knees.knee_se[:, 0]
+    if not dp or np.isnan(knee).any():
+        return None
+    weights = np.maximum(se, FINEST_ERROR * u_max) ** -2
+    if direction == "flat":
+        knee = np.full_like(knee, np.average(knee, weights=weights))
+    else:
+        knee = isotonic_regression(knee, weights=weights, increasing=direction == "increasing").x
+    # The larger of two curves that run one way runs that way too.
+    highest = np.max([knee, *(np.array(curve.u_offset_V) for curve in guards.values())], axis=0)
+    return OpeningCurve(dp_MPa=dp, u_V=tuple(map(float, highest)), u_se_V=tuple(map(float, se)))

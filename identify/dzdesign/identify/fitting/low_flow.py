@@ -15,11 +15,12 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import worded
-from dzdesign.identify.constants import L_MIN, MPA
-from dzdesign.identify.fitting.guarded_thresholds import DECIMALS, GuardedThreshold, Guarding
+from dzdesign.identify.constants import L_MIN, MPA, Shown
+from dzdesign.identify.fitting.guarded_thresholds import GuardedThreshold, Guarding
 from dzdesign.identify.fitting.zero_flow import allowed_at_zero
-from dzdesign.identify.knees.branch_shape import BranchShape
+from dzdesign.identify.knees.between_ramps import DECIMALS
 from dzdesign.identify.knees.described_tests import DescribedTests
+from dzdesign.identify.knees.gated_line import BranchShape
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.valve.guard_curve import CertifiedCurve, Guard
 from dzdesign.identify.valve.low_flow import IN_WORDS, SAME_PRESSURE, Branch, LowFlow
@@ -129,12 +130,10 @@ def _refuse_another_valve(row: LowFlow, dp: np.ndarray, guarding: Guarding, grou
         most = max((1 + OF_FLOW) * high, level)
         if row.at_most_L_min < least or row.at_least_L_min > most:
             raise InputError(
-                worded(
-                    "{source} has {flow:.3g L/min} at {u:.4g V} and {at:.3g MPa}, but the ramps allow {low:.3g #L/min} "
-                    "to {high:.3g L/min} there; check the units and the branch, and whether it was taken at this "
-                    "valve",
-                    source=row.source, flow=row.q_L_min, u=row.u_V, at=row.dp_MPa, low=least, high=most,
-                )
+                f"{row.source} has {Shown(row.q_L_min):.3g L/min} at {Shown(row.u_V):.4g V} and "
+                f"{Shown(row.dp_MPa):.3g MPa}, but the ramps allow {Shown(least):.3g #L/min} to "
+                f"{Shown(most):.3g L/min} there; check the units and the branch, and whether it was taken at this "
+                "valve"
             )  # fmt: skip
 
 
@@ -183,12 +182,11 @@ def _lowered(
 
 
 def _open_below(row: LowFlow, branch: Branch, threshold: float, least: float) -> str:
-    return worded(
-        "{source} shows at least {flow:.3g L/min} at {u:.4g V} and {at:.3g MPa}. This command lies below the threshold "
-        "on {branch} from the ramps, {threshold:.4g V}, and a flow of up to {least:.3g L/min} counts as no flow; add a "
-        "reading of {branch} at a lower command with no more flow, or declare the allowed flow by --zero-flow",
-        source=row.source, flow=row.at_least_L_min, u=row.u_V, at=row.dp_MPa, branch=IN_WORDS[branch],
-        threshold=threshold, least=least,
+    return (
+        f"{row.source} shows at least {Shown(row.at_least_L_min):.3g L/min} at {Shown(row.u_V):.4g V} and "
+        f"{Shown(row.dp_MPa):.3g MPa}. This command lies below the threshold on {IN_WORDS[branch]} from the ramps, "
+        f"{Shown(threshold):.4g V}, and a flow of up to {Shown(least):.3g L/min} counts as no flow; add a reading of "
+        f"{IN_WORDS[branch]} at a lower command with no more flow, or declare the allowed flow by --zero-flow"
     )  # fmt: skip
 
 

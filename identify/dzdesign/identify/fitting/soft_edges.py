@@ -5,6 +5,9 @@ whose gain only grows as they open, and that pass a given flow at a given comman
 in two straight parts: from where it closes, with a share of the gain over a width, and then with all of it. The
 recordings of all tests, which one edge has made, say which shares and widths are credible. The meter's lag rounds a
 sharp edge too, so each is asked with every lag that the meter may have.
+
+Readings about the edge are averaged over short stretches of the command, and base, slope and knee of each such edge are
+fitted to them: what a slow meter with a floor would show of it.
 """
 
 import math
@@ -13,11 +16,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM
-from dzdesign.identify.fitting.edge_averages import EdgeAverages, average_about_edge, smallest_flow_shown
-from dzdesign.identify.fitting.edge_fits import fit_edges
-from dzdesign.identify.knees.branch_shape import BranchShape
-from dzdesign.identify.knees.meter_lag import MeterLag
+from dzdesign.identify.knees.gated_line import GATE, BranchShape
+from dzdesign.identify.knees.line_fitting import DEGREES_OF_FREEDOM
+from dzdesign.identify.knees.meter import MeterLag
 
 #: Shares of the flow gain, and widths over u_max, that the first part may have.
 SHARES, WIDTHS = np.array([0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]), np.geomspace(3e-3, 0.2, 11)
@@ -27,6 +28,50 @@ REFINED, FINER = 3, 5
 HARMLESS = 0.5
 #: Neighbouring lags differ by what rounds a sharp edge by this share of the level, but there are no more than these.
 LAG_STEP, MOST_LAGS = 0.3, 8
+
+#: Readings are averaged over this share of u_max from so far below the knee to so far above, and over more beyond.
+FINE, BELOW, ABOVE, COARSE = 2e-3, 0.06, 0.08, 1e-2
+#: How far below the knee they are averaged at all, over u_max.
+LOWEST = 0.25
+#: Fewest averages, or readings, that tell an edge.
+FEWEST = 8
+#: Readings up to this multiple of a meter's floor, from so far below the knee on (over u_max): this share of them lies
+#: below its estimate, and what is below this share of the floor is noise.
+NEAR_FLOOR, FROM, LOWEST_SHARE, PEAKS = 1.2, 0.03, 0.1, 0.3
+#: Noise below this share of a floor makes no difference.
+FINEST = 1e-3
+#: Averages over which the scatter of readings near a floor, some of them zeros, is smoothed.
+SMOOTHED = 5
+#: Noise of a shut reading over that of a flowing one, at least; and share of an average's width by which straight parts
+#: that meet inside it miss the mean over it.
+QUIETEST, CORNER = 0.3, 0.1
+
+#: Rounds in which base, slope and knee are fitted, and share of u_max by which the knee moves at most in one.
+ROUNDS, LARGEST_STEP = 3, 0.03
+#: The slope may be that of the straight part divided or multiplied by this.
+OTHER_SLOPE = 2.0
+#: Added to the scaled normal equations, so that columns that are alike can be told apart.
+RIDGE = 1e-12
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EdgeAverages:
+    """Averages of one test's branch; commands in V, flows in m³/s, weights in s²/m⁶, each (B,)."""
+
+    u: np.ndarray
+    y: np.ndarray
+    weight: np.ndarray
+    #: Where the fits start from, V and m³/(s V).
+    knee: float
+    slope: float
+    #: The meter's floor, 0 if it has none: then what it reads while the valve is shut is fitted too; its noise, m³/s.
+    floor: float
+    noise: float
+    #: Whether the meter shows negative flows beyond its floor.
+    signed: bool
+    rising: bool
+    #: Pace of the command, V/s.
+    rate: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,3 +230,125 @@ def _lowest_credible(grid: _Shapes, limit: float) -> np.ndarray:
             at = [grid.at_level[:, :, side][:, ends] for side in (one, other)]
             lowest = np.minimum(lowest, (at[0] + part * (at[1] - at[0])).min(axis=1))
     return lowest
+
+
+# ---------------------------------------------------------------------------------------------- averages about the edge
+def smallest_flow_shown(shapes: Sequence[BranchShape], u_max: float) -> float:
+    """Return the smallest flow that the meter shows, m³/s, which is below the floor that is on the safe side; or 0."""
+    floor = shapes[0].prepared.floor
+    seen = []
+    for shape in shapes:
+        u, q = shape.prepared.branch.u, shape.prepared.branch.q
+        seen.append(q[(u > shape.line.knee - FROM * u_max) & (q > PEAKS * floor) & (q < NEAR_FLOOR * floor)])
+    readings = np.concatenate(seen)
+    return min(floor, float(np.quantile(readings, LOWEST_SHARE))) if floor > 0 and readings.size >= FEWEST else floor
+
+
+def average_about_edge(shape: BranchShape, floor: float, u_max: float) -> EdgeAverages | None:
+    """Average the readings about the knee; None where too few are left."""
+    read, line = shape.prepared, shape.line
+    u, y = read.branch.u, read.y
+    top = float(u[line.kept].max())
+    noise = max(shape.noise, QUIETEST * shape.sigma)
+    furthest = max(GATE * max(noise, shape.sigma), NEAR_FLOOR * floor) + COARSE * u_max * shape.slope
+    near = np.abs(y - np.interp(u, *read.profile)) <= furthest
+    ends = [line.knee + share * u_max for share in (-LOWEST, -BELOW, ABOVE)] + [top + COARSE * u_max]
+    edges = np.concatenate(
+        [np.arange(ends[at], ends[at + 1], width * u_max) for at, width in enumerate((COARSE, FINE, COARSE))]
+    )
+    rows = (u >= edges[0]) & (u <= top) & near
+    if rows.sum() < FEWEST or edges.size < FEWEST:
+        return None
+    index = np.searchsorted(edges, u[rows], side="right")
+    count = np.bincount(index)
+    filled = count > 0
+    u_mean, y_mean = (np.bincount(index, weights=values[rows])[filled] / count[filled] for values in (u, y))
+    if u_mean.size < FEWEST:
+        return None
+    variance = np.where(u_mean < line.knee, noise, shape.sigma) ** 2
+    if floor > 0:
+        scatter = np.bincount(index, weights=y[rows] ** 2)[filled] / count[filled] - y_mean**2
+        variance = np.maximum(variance, np.convolve(scatter, np.full(SMOOTHED, 1 / SMOOTHED), "same"))
+    of_noise = variance * shape.variance_inflation / count[filled]
+    return EdgeAverages(
+        u=u_mean,
+        y=y_mean,
+        weight=1 / (of_noise + (CORNER * FINE * u_max * shape.slope) ** 2),
+        knee=line.knee,
+        slope=shape.slope,
+        floor=floor,
+        noise=max(shape.sigma, FINEST * floor),
+        signed=bool(np.any(y < -PEAKS * floor)),
+        rising=read.branch.rising,
+        rate=read.branch.rate if math.isfinite(read.branch.rate) else 0.0,
+    )
+
+
+# ----------------------------------------------------------------------------------------------- the edges' fits
+def fit_edges(
+    test: EdgeAverages, share: np.ndarray, width: np.ndarray, *, seconds: float, u_max: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return sum of squares, knee (V) and slope (m³/(s V)) of the fits of H edges to one test, each (H,).
+
+    An edge opens with a `share` (H,) of its flow gain over a `width` (H,), V, and then with all of it; the knee is
+    where its last part comes to zero. The meter has a lag of so many seconds.
+    """
+    knee, slope = np.full(share.size, test.knee), np.full(share.size, test.slope)
+    shift = seconds * test.rate
+    # The knee is that of readings put right for this lag, as the other knees are for theirs: how the two differ is in
+    # the bounds already.
+    u = test.u + (shift if test.rising else -shift)
+    first, second = (1 - share) * width, share * width
+    base = np.zeros(share.size)
+    root = np.sqrt(test.weight)
+    for _ in range(ROUNDS):
+        x = u - knee[:, None]
+        before, gain_before = _reading(x + first[:, None], shift, rising=test.rising)
+        beyond, gain_beyond = _reading(x - second[:, None], shift, rising=test.rising)
+        flow = share[:, None] * before + (1 - share)[:, None] * beyond
+        gain = share[:, None] * gain_before + (1 - share)[:, None] * gain_beyond
+        shown, part = _above_floor(test, slope[:, None] * flow)
+        columns = [part * flow * root, -part * slope[:, None] * gain * root]
+        if test.floor == 0:
+            columns.append(np.broadcast_to(root, x.shape))
+        missed = (test.y - shown - base[:, None]) * root
+        design = np.stack(columns, axis=1)  # (H, P, B)
+        right = (design @ missed[:, :, None])[:, :, 0]
+        normal = design @ design.transpose(0, 2, 1)
+        scale = np.sqrt(np.maximum(np.einsum("hpp->hp", normal), np.finfo(float).tiny))
+        normal = normal / scale[:, :, None] / scale[:, None, :] + RIDGE * np.eye(len(columns))
+        step = np.linalg.solve(normal, (right / scale)[:, :, None])[:, :, 0] / scale
+        squares = np.einsum("hb,hb->h", missed, missed) - np.einsum("hp,hp->h", step, right)
+        slope = np.clip(slope + step[:, 0], test.slope / OTHER_SLOPE, OTHER_SLOPE * test.slope)
+        knee = knee + np.clip(step[:, 1], -LARGEST_STEP * u_max, LARGEST_STEP * u_max)
+        base = base + step[:, 2] if test.floor == 0 else base
+    return np.maximum(squares, 0.0), knee, slope
+
+
+def _above_floor(test: EdgeAverages, flow: np.ndarray) -> tuple[np.ndarray, np.ndarray | float]:
+    """Return what a meter shows of a flow on average that reads zero below its floor, and its derivative."""
+    if test.floor == 0:
+        return flow, 1.0
+    from scipy.special import ndtr
+
+    above, below = (flow - test.floor) / test.noise, (-flow - test.floor) / test.noise
+    seen, edge = ndtr(above), np.exp(-(above**2) / 2)
+    other, other_edge = (ndtr(below), np.exp(-(below**2) / 2)) if test.signed else (0.0, 0.0)
+    density = 1 / math.sqrt(2 * math.pi)
+    shown = flow * (seen + other) + test.noise * density * (edge - other_edge)
+    return shown, seen + other + test.floor / test.noise * density * (edge + other_edge)
+
+
+def _reading(x: np.ndarray, shift: float, *, rising: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Return what a first-order meter shows of a flow of unit slope from x = 0 on, and its derivative.
+
+    `shift` is the rate times the lag, V.
+    """
+    ahead = np.maximum(x, 0.0)
+    if shift <= 0:
+        return ahead, (x > 0).astype(float)
+    if rising:
+        gain = 1 - np.exp(-ahead / shift)
+        return ahead - shift * gain, gain
+    gain = np.exp(np.minimum(x, 0.0) / shift)
+    return ahead + shift * gain, gain

@@ -12,20 +12,17 @@ was read at rest. What a meter's floor hides counts as the floor.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.core.recorded_units import worded
-from dzdesign.identify.constants import L_MIN
-from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, lower_bounds
-from dzdesign.identify.fitting.threshold import Threshold
-from dzdesign.identify.knees.between_ramps import FEWEST_DEGREES, BetweenRamps
-from dzdesign.identify.knees.branch_shape import BranchShape
-from dzdesign.identify.knees.dead_zone import FEWEST, SHUT_TO
+from dzdesign.identify.constants import L_MIN, Shown
+from dzdesign.identify.fit.scatter import LEAST_DEGREES
+from dzdesign.identify.knees.characteristic import FEWEST, SHUT_TO
 from dzdesign.identify.knees.described_tests import DescribedTests
-from dzdesign.identify.knees.gated_line import GATE, fit_line
+from dzdesign.identify.knees.gated_line import GATE, BranchShape, fit_line
+from dzdesign.identify.knees.line_fitting import DEGREES_OF_FREEDOM
 from dzdesign.identify.knees.profile import crossing
 from dzdesign.identify.options import IdentifyOptions
 
@@ -60,7 +57,7 @@ def allowed_at_zero(group: DescribedTests, options: IdentifyOptions) -> tuple[fl
 
 def largest_at_rest(group: DescribedTests, options: IdentifyOptions) -> list[float]:
     """Return what the shut valve passes at most of the flow that was subtracted from each test, m³/s."""
-    errors = _errors(options, len(group.tests))
+    errors = student_errors(options, len(group.tests))
     return [flow + errors * error + options.meter_zero for flow, error in group.at_rest]
 
 
@@ -71,27 +68,27 @@ def refuse_a_large_zero_flow(group: DescribedTests, options: IdentifyOptions) ->
     least = min(group.tests, key=lambda item: item.q_max)
     if options.zero_flow >= options.knee_window[0] * least.q_max:
         raise InputError(
-            worded(
-                "a flow at zero of {flow:.3g L/min} is declared, {share:.0%} of the largest flow of '{source}', "
-                "expected less than {most:.0%}: above, the valve is open. Declare what the machine may leak at rest",
-                flow=options.zero_flow / L_MIN,
-                share=options.zero_flow / least.q_max,
-                source=least.test.source,
-                most=options.knee_window[0],
-            )
+            f"a flow at zero of {Shown(options.zero_flow / L_MIN):.3g L/min} is declared, "
+            f"{options.zero_flow / least.q_max:.0%} of the largest flow of '{least.test.source}', expected less than "
+            f"{options.knee_window[0]:.0%}: above, the valve is open. Declare what the machine may leak at rest"
         )
 
 
-def with_zero_flow(
-    group: DescribedTests, column: int, found: Threshold, budget: np.ndarray, options: IdentifyOptions
-) -> Threshold:
-    """Return a threshold moved up to where the valve passes the flow allowed at zero, as far as the data support it.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ZeroFlow:
+    """Where each test passes the flow that is allowed at zero, V (T,): most likely, with its error, and for certain."""
 
-    `found` is the threshold without such a flow, `budget` (V, (T,)) what is taken off a bound beside noise and scatter.
-    """
+    at: np.ndarray
+    at_se: np.ndarray
+    #: The highest command up to which the ramps certainly pass no more; -inf where there is none.
+    safe: np.ndarray
+
+
+def find_zero_flow(group: DescribedTests, column: int, options: IdentifyOptions) -> ZeroFlow | None:
+    """Find where the valve passes the flow allowed at zero, as far as the data support it; None: not declared."""
     allowed = allowed_at_zero(group, options)
     if allowed is None:
-        return found
+        return None
     refuse_a_large_zero_flow(group, options)
     shapes = [item.branch(column) for item in group.tests]
     readings = [_readings(shape, group.floor) for shape in shapes]
@@ -103,7 +100,7 @@ def with_zero_flow(
     ]
     at, at_se = np.array(crossings).T
     scatter = _scatter(list(zip(shapes, readings, at.tolist(), strict=True)), options)
-    errors = _errors(options, len(STRETCHES) * len(shapes))
+    errors = student_errors(options, len(STRETCHES) * len(shapes))
     safe = np.array([
         _highest_safe(
             shape, each, flow - at_rest - scatter, errors, se * math.sqrt(shape.variance_inflation), options.u_max
@@ -112,14 +109,10 @@ def with_zero_flow(
             shapes, readings, allowed, largest_at_rest(group, options), group.zero_se, strict=True
         )
     ])  # fmt: skip
-    bound = _with_scatter(safe, group.between(column), options.confidence, budget)
-    moved = bound > found.bound
-    bound = np.where(moved, bound, found.bound)
-    value = np.where(moved, np.maximum(at, bound), found.value)
-    return replace(found, value=value, se=np.where(moved, at_se, found.se), bound=bound)
+    return ZeroFlow(at=at, at_se=at_se, safe=safe)
 
 
-def _errors(options: IdentifyOptions, count: int) -> float:
+def student_errors(options: IdentifyOptions, count: int) -> float:
     """Return how many standard errors bound one of so many estimates, all together at the confidence."""
     from scipy.special import stdtrit
 
@@ -183,9 +176,7 @@ def _crossing(shape: BranchShape, readings: _Readings, flow: float, u_max: float
     return at, 4 * width
 
 
-def _scatter(
-    tests: Sequence[tuple[BranchShape, _Readings, float]], options: IdentifyOptions
-) -> float:
+def _scatter(tests: Sequence[tuple[BranchShape, _Readings, float]], options: IdentifyOptions) -> float:
     """Return what the flow of the next closing may exceed the ramps' mean by, m³/s, where ramps of a test leak unlike.
 
     Oil that warms up leaks more at the same command, which no shift of the command tells. Pooled over all tests.
@@ -206,15 +197,7 @@ def _scatter(
         noise += freedom * variance * shape.variance_inflation * float(np.mean(1 / count[told]))
         degrees += freedom
         fewest = min(fewest, means.size)
-    if degrees < FEWEST_DEGREES or squares <= noise:
+    if degrees < LEAST_DEGREES or squares <= noise:
         return 0.0
     sd = math.sqrt((squares - noise) / degrees)
     return float(stdtrit(degrees, 1 - (1 - options.confidence) / len(tests))) * sd * math.sqrt(1 + 1 / fewest)
-
-
-def _with_scatter(safe: np.ndarray, between: BetweenRamps, confidence: float, budget: np.ndarray) -> np.ndarray:
-    """Take off safe commands, V, what the next closing may differ by: the noise is in them already."""
-    known = np.isfinite(safe)
-    lowered = lower_bounds(np.where(known, safe, 0.0), np.zeros(safe.size), between, confidence, budget)
-    bound: np.ndarray = np.where(known, lowered, -math.inf)
-    return bound

@@ -1,217 +1,133 @@
-"""What differs from ramp to ramp: the scatter that repeats show, and a drift through the series.
+"""What differs from ramp to ramp: each ramp's own knee, the scatter that repeats show, and a drift through the series.
 
 The noise of one ramp says how well that ramp's knee is known, and nothing of where the valve closes the next time. The
-knees of the single ramps obey one linear model for each branch,
-
-    knee[j] = threshold at the pressure drop of ramp j + drift * when[j] + scatter[j],
-
-with `when` from -1/2 at the first ramp of the series to 1/2 at the last. Least squares gives the drift, if order and
-pressure drop can be told apart, and the residuals, pooled over all pressure drops, the scatter. The ramps are then
-brought to the state in the middle of the series, so that those pooled to one test lie on one line; `fitting.bounds`
-allows for the next closing at any state that the series has seen.
-
-The premise is a normal scatter, as large at all pressure drops and independent from ramp to ramp.
+knees of the single ramps obey the model of `fit.ramp_model`; `fit.scatter` measures their scatter. Here the ramps are
+brought to the state in the middle of the series, so that those pooled to one test lie on one line, and held against the
+premises of that model: independent, no copies, of one population. Each check is exact, or nearly so, for few repeats of
+a normal scatter, and none of them sees everything.
 """
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from dzdesign.identify.knees.branch_shape import BranchShape
-from dzdesign.identify.knees.gated_line import fit_line
-from dzdesign.identify.knees.least_noise import least_noise, least_step
-from dzdesign.identify.knees.scatter_checks import ScatterChecks, check_scatter, find_alike_repeats, find_two_groups
-from dzdesign.identify.valve.repeatability import NoDrift, Origin
+from dzdesign.identify.constants import REFUSED
+from dzdesign.identify.fit.ramp_model import RampModel, Ramps, fit_ramp_model
+from dzdesign.identify.fit.scatter import Scatter, measure_scatter
+from dzdesign.identify.knees.gated_line import BranchShape, fit_line
+from dzdesign.identify.knees.noise import least_noise, least_step
+from dzdesign.identify.options import IdentifyOptions
 
-#: Standard deviation of the thresholds from ramp to ramp, over u_max, taken where nothing tells it: data sheets of
-#: valves without a position sensor state a repeatability of about 1 %, as a band of two standard deviations each way.
-ASSUMED_REPEATABILITY = 2.5e-3
-#: Fewest degrees of freedom of a small scatter that is believed: the one difference of two ramps may be so by chance.
-FEWEST_DEGREES = 2
-#: With fewer degrees of freedom the scatter is known so badly that repeats pay twice.
-FEW_DEGREES = 4
 #: A ramp tells its own knee with at least so many samples, over this share of the straight part.
 RAMP_SAMPLES, RAMP_SPAN = 5, 0.5
-#: A term of the model is told apart where its standard error is at most so many times the scatter of one ramp.
-TOLD_APART = 2.0
-#: Squares of a term, over those of a clock from -1/2 to 1/2, that are rounding.
-NOTHING = 1e-9
-#: Probability of a scatter as large as the repeats', if the declared one were true, below which it is not believed.
-CONTRADICTED = 1e-3
-#: Smallest share of the noise in a variance that is counted in its degrees of freedom.
-SMALLEST_SHARE = 1e-3
-#: Scatter over u_max below which pressure drops don't differ in it.
-FINEST = 1e-5
-#: Share of itself by which a drift that flattens out, as of oil that warms up, departs from a straight one at most.
-UNEVEN = 0.4
+#: Decimals of valve.json: the ramps are rounded before they are fitted, so that a reader finds the same bound.
+DECIMALS = 7
+#: Probability with which true repeats are as alike as copies are.
+AS_ALIKE = 1e-3
+#: Fewest degrees of freedom in which neighbouring ramps can be told to be alike.
+FEWEST_IN_A_ROW = 4
+#: Probability of two groups of ramps below which they are no chance, and the fewest ramps of a test that is parted.
+PARTED, FEWEST_TO_PART = 1e-3, 3
+#: Degrees of freedom below the one, and squares over those of the noise below the other, are rounding.
+NO_DEGREES, NOTHING = 1e-6, 1e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Drift:
-    """Change of the thresholds of one branch from the first ramp of the series to the last."""
+class RampKnees:
+    """Knees of the single ramps of one branch, (R,). A test of which no ramp tells its knee counts as one ramp."""
 
-    #: It and its standard error, V.
-    change: float
-    change_se: float
-    #: Largest departure from a straight drift that the recordings can't show, V.
-    uneven: float
+    #: Test of each, and which ramp of it, from 0; -1 where it stands for its test.
+    test: np.ndarray
+    number: np.ndarray
+    #: V, and the standard error that the noise gives it, V.
+    knee: np.ndarray
+    se: np.ndarray
+    #: When it was recorded, s on a clock common to all; NaN where that is not known.
+    when: np.ndarray
+    #: Variance that the noise gives each knee at least, V²; 0 where it is not known.
+    least: np.ndarray
+    #: What the recording's columns of two values say of each, and its name.
+    switched: Sequence[Mapping[str, str]]
+    source: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class AlikeRepeats:
+    """Repeats that scatter less than the meter's noise makes possible: copies, or one recording twice."""
+
+    #: Test whose repeats are the most alike, from 0, and whether it is that one or all tests together.
+    test: int
+    everywhere: bool
+    #: Standard deviation of the knees, V, and what the noise alone gives them at least.
+    sd: float
+    of_noise: float
+
+
+@dataclass(frozen=True, slots=True)
+class TwoGroups:
+    """Ramps of two populations: of two sides, two benches, or a valve that closes at two places."""
+
+    #: Distance of their thresholds, V, mean over the tests.
+    apart: float
+    #: Test and number in it of one ramp of each, in one test, that of the lower threshold first.
+    ramps: tuple[tuple[int, int], tuple[int, int]]
+    #: Column that separates them, and what it says of each; empty where none does.
+    column: str = ""
+    values: tuple[str, str] = ("", "")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScatterChecks:
+    """What the ramps of one branch say against the premises; None where they don't."""
+
+    #: Correlation of neighbouring ramps.
+    serial: float | None = None
+    alike: AlikeRepeats | None = None
+    groups: TwoGroups | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BetweenRamps:
-    """What one branch shows, or is taken to show, from ramp to ramp; T tests."""
+    """What the ramps of one branch show; n ramps, T tests."""
 
-    #: Standard deviation from ramp to ramp, V, and its degrees of freedom (infinite where it was not measured).
-    sd: float
-    degrees: float
-    origin: Origin
-    #: Variance in `sd` that is the noise of one ramp, V²; 0 where it was not measured.
-    noise: float
-    #: Covariance of the tests' thresholds, and after them of the drift where it is in the model, over sd² (P, P).
-    covariance: np.ndarray
-    drift: Drift | None
-    #: Why there is no drift in the model; empty where there is.
-    no_drift: NoDrift
-    #: What the ramps tell, each by itself.
-    known: "RampKnees"
+    #: Their knees with the numbers that valve.json will have, the test of each (n,), and their names.
+    ramps: Ramps
+    test: np.ndarray
+    sources: tuple[str, ...]
+    scatter: Scatter
     #: By how much each ramp of each test stands off the middle of the series and of its test's ramps, V.
     shifts: tuple[np.ndarray, ...]
-    #: What the repeats say against the premises.
+    #: What the ramps say against the premises.
     checks: ScatterChecks
 
-    def covariance_of_mean(self, noise_se: np.ndarray) -> np.ndarray:
-        """Return the covariance of the thresholds in the middle of the series, V² (T, T).
+    def variance_of_next(self, *, noise: bool = True) -> np.ndarray:
+        """Return the variance of the next closing (or opening) less the mean of each test's ramps, V² (T,).
 
-        `noise_se` (T,) is what the noise alone leaves of each.
+        Without `noise`, less a threshold in whose error that of the ramps is already.
         """
-        tests = noise_se.size
-        return self.sd**2 * self.covariance[:tests, :tests] + np.diag(self._noise(noise_se))
-
-    def variance_of_next(self, noise_se: np.ndarray, state: float) -> np.ndarray:
-        """Return the variance of the next closing (or opening) less each test's threshold, V² (T,).
-
-        The valve is in a state that the series has seen, from -1/2 (the first ramp's) to 1/2 (the last one's).
-        """
-        tests = noise_se.size
-        lever = np.diag(self.covariance)[:tests]
-        if self.drift is not None:
-            lever = lever + 2 * state * self.covariance[:tests, tests] + state**2 * self.covariance[tests, tests]
-        variance: np.ndarray = self.sd**2 * (1 + lever) + self._noise(noise_se)
-        return variance
-
-    def degrees_of_freedom(self, noise_se: np.ndarray, of_noise: float) -> np.ndarray:
-        """Return the effective degrees of freedom of these variances (T,) (Welch and Satterthwaite)."""
-        if self.origin == "repeats":
-            return np.full(noise_se.shape, self.degrees)
-        every = np.diag(self.covariance_of_mean(noise_se))
-        share = noise_se**2 / np.maximum(every, np.finfo(float).tiny)
-        degrees: np.ndarray = of_noise / np.maximum(share, SMALLEST_SHARE) ** 2
-        return degrees
-
-    def _noise(self, noise_se: np.ndarray) -> np.ndarray:
-        """Return what the noise adds, V²: all of it, or what exceeds the average ramp's where `sd` has that in it."""
-        own = np.diag(self.covariance)[: noise_se.size]
-        added: np.ndarray = np.maximum(noise_se**2 - self.noise * own, 0.0)
-        return added
-
-
-@dataclass(frozen=True, slots=True)
-class RampKnees:
-    """Knees of the single ramps that tell one, (R,), of one branch."""
-
-    #: Test of each, and which ramp of it, from 0.
-    test: np.ndarray
-    number: np.ndarray
-    #: V, and the variance that the noise gives it, V².
-    knee: np.ndarray
-    noise: np.ndarray
-    #: When it was recorded, s on a clock common to all; NaN where that is not known.
-    when: np.ndarray
-    #: Variance that the noise gives each knee at least, V²; 0, or no array, where it is not known.
-    least: np.ndarray | None = None
-    #: What the recording's columns of two values say of each; nothing where there are none.
-    switched: Sequence[Mapping[str, str]] = ()
-
-
-def pool_scatter(known: RampKnees, counts: Sequence[int], *, declared: float | None, u_max: float) -> BetweenRamps:
-    """Compare the ramps of one branch, on the premise that they scatter alike.
-
-    Parameters
-    ----------
-    known : RampKnees
-        What the ramps tell, each by itself.
-    counts : sequence of int
-        Ramps of each of the T tests.
-    declared : float or None
-        Standard deviation from ramp to ramp, V; None measures it where ramps were repeated, and assumes it elsewhere.
-        A declared or assumed one that the repeats contradict is not taken.
-    u_max : float
-        Full command, V.
-    """
-    count = len(counts)
-    clock, no_drift = _series_clock(known, count)
-    design = (known.test[:, None] == np.arange(count)).astype(float)
-    told = design.any(axis=0)
-    design = design[:, told] if no_drift else np.column_stack([design, clock])
-    found = np.linalg.lstsq(design, known.knee, rcond=None)[0]
-    residual = known.knee - design @ found
-    degrees = residual.size - design.shape[1]
-    squares, noise = float(residual @ residual), float(known.noise.mean()) if residual.size else 0.0
-    origin = _origin(squares, noise, degrees, declared, u_max)
-    measured = origin == "repeats"
-    least = known.noise + (FINEST * u_max) ** 2
-    checks = check_scatter(residual, design, least, known.when)
-    checks = replace(
-        checks,
-        alike=find_alike_repeats(residual, design, known.test, known.least),
-        groups=find_two_groups(known.knee, known.test, known.number, known.noise, known.switched),
-    )
-    sd = math.sqrt(squares / degrees) if measured else ASSUMED_REPEATABILITY * u_max if declared is None else declared
-    rows = told if no_drift else np.ones(count + 1, dtype=bool)
-    # A test without a ramp that tells its knee counts as one ramp.
-    covariance = np.eye(rows.size)
-    covariance[np.ix_(rows, rows)] = np.linalg.inv(design.T @ design)
-    drift = None
-    if not no_drift:
-        # Where a bend of the drift would show, it is in the scatter already.
-        shows = measured and _error_of_last(np.column_stack([design, (2 * clock) ** 2])) <= TOLD_APART
-        error = math.sqrt((sd**2 + noise * (not measured)) * covariance[-1, -1])
-        drift = Drift(change=float(found[-1]), change_se=error, uneven=0.0 if shows else UNEVEN * abs(float(found[-1])))
-    # Only what exceeds the noise is scatter of the valve: to move ramps by their noise would blur the edge.
-    kept = max(1 - noise * degrees / squares, 0.0) if degrees > 0 and squares > 0 else 0.0
-    moved = kept * residual + (drift.change * clock if drift else 0.0)
-    shifts = tuple(np.zeros(ramps) for ramps in counts)
-    for row, number, shift in zip(known.test, known.number, moved, strict=True):
-        shifts[row][number] = shift
-    return BetweenRamps(
-        sd=sd,
-        degrees=float(degrees) if measured else math.inf,
-        origin=origin,
-        noise=noise if measured else 0.0,
-        covariance=covariance,
-        drift=drift,
-        no_drift=no_drift,
-        known=known,
-        shifts=shifts,
-        checks=checks,
-    )
+        of_next, count = self.scatter.share * self.scatter.variance, np.bincount(self.test)
+        of_valve = max(self.scatter.variance - self.scatter.noise, 0.0)
+        own = of_valve + np.bincount(self.test, self.ramps.se**2) / count
+        found: np.ndarray = of_next + (own if noise else of_next) / count
+        return found
 
 
 def knees_of_ramps(
     shapes: Sequence[BranchShape],
+    names: Sequence[tuple[str, ...]],
     when: Sequence[Sequence[float]],
     switched: Sequence[Sequence[Mapping[str, str]]],
 ) -> RampKnees:
     """Return the zeros of lines through each ramp's samples of the straight part that the test's line rests on.
 
-    `when` has for each ramp of each test when it was recorded, s, on one clock for all; `switched` what the
-    recording's columns of two values say of it.
+    `names` has that of each ramp of each test, `when` the time of its recording, s, on one clock for all; `switched`
+    what the recording's columns of two values say of it.
     """
-    told: list[tuple[float, ...]] = []
+    rows, marks, sources = list[tuple[float, ...]](), list[Mapping[str, str]](), list[str]()
     for test, (shape, times) in enumerate(zip(shapes, when, strict=True)):
-        branch, seen = shape.prepared.branch, shape.line.kept & ~shape.line.censored
+        branch, seen, told = shape.prepared.branch, shape.line.kept & ~shape.line.censored, len(rows)
         width, step = float(np.ptp(branch.u[seen])), least_step(branch.q)
         for number, part in enumerate(branch.ramps):
             u, y = branch.u[part][seen[part]], shape.prepared.y[part][seen[part]]
@@ -221,45 +137,198 @@ def knees_of_ramps(
             if slope <= 0:
                 continue
             lever = 1 / u.size + (u.mean() - knee) ** 2 / float(np.sum((u - u.mean()) ** 2))
-            noise = (shape.sigma / slope) ** 2 * lever * shape.variance_inflation
+            se = shape.sigma / slope * math.sqrt(lever * shape.variance_inflation)
             at_least = least_noise(branch.q[part][seen[part]], step) / slope**2 * lever
-            told.append((test, number, knee, noise, times[number], at_least))
-    columns = np.array(told).reshape(-1, 6).T
-    test, number = columns[:2].astype(int)
-    marks = [switched[row][ramp] for row, ramp in zip(test, number, strict=True)]
+            rows.append((test, number, knee, se, times[number], at_least))
+            marks.append(switched[test][number])
+            sources.append(names[test][number])
+        if len(rows) == told:
+            rows.append((test, -1, shape.knee, shape.line.knee_se, math.nan, 0.0))
+            marks.append({})
+            sources.append(shape.prepared.source)
+    columns = np.array(rows).reshape(-1, 6).T
+    test_of, numbers = columns[:2].astype(int)
     return RampKnees(
-        test=test, number=number, knee=columns[2], noise=columns[3], when=columns[4], least=columns[5], switched=marks
+        test=test_of, number=numbers, knee=columns[2], se=columns[3], when=columns[4], least=columns[5],
+        switched=marks, source=tuple(sources),
+    )  # fmt: skip
+
+
+def compare_ramps(
+    known: RampKnees, dp_MPa: np.ndarray, counts: Sequence[int], options: IdentifyOptions
+) -> BetweenRamps:
+    """Compare the ramps of one branch of T tests, at pressure drops (T,), with so many ramps each."""
+    dated = dp_MPa.size > 1 and bool(np.isfinite(known.when).all()) and np.ptp(known.when) > 0
+    ramps = Ramps(
+        dp_MPa=np.round(dp_MPa, DECIMALS)[known.test],
+        y=np.round(known.knee, DECIMALS),
+        se=np.round(known.se, DECIMALS),
+        clock=np.round((known.when - known.when.min()) / np.ptp(known.when) - 0.5, DECIMALS) if dated else None,
     )
+    declared, assumed = options.scatter_V
+    shifts, checks = tuple(np.zeros(ramps_of_test) for ramps_of_test in counts), ScatterChecks()
+    told = known.number >= 0
+    if told.any():
+        model, test, number = fit_ramp_model(ramps.only(told), share_knots=False), known.test[told], known.number[told]
+        for row, at, shift in zip(test, number, _shifts(model, test), strict=True):
+            shifts[row][at] = shift
+        marks = [mark for mark, tells in zip(known.switched, told, strict=True) if tells]
+        checks = ScatterChecks(
+            serial=find_serial_correlation(model, known.when[told]),
+            alike=find_alike_repeats(model, test, known.least[told]),
+            groups=find_two_groups(known.knee[told], test, number, known.se[told] ** 2, marks),
+        )
+    return BetweenRamps(
+        ramps=ramps, test=known.test, sources=known.source,
+        scatter=measure_scatter(ramps, declared=declared, assumed=assumed), shifts=shifts, checks=checks,
+    )  # fmt: skip
 
 
-def _series_clock(known: RampKnees, count: int) -> tuple[np.ndarray, NoDrift]:
-    """Return when each ramp was recorded, from -1/2 to 1/2, and why it tells no drift; empty where it does."""
-    clock = np.zeros(known.test.size)
-    if count < 2:
-        return clock, "one pressure drop"
-    if np.unique(known.test).size < count or not np.ptp(known.when) > 0:
-        return clock, "order unknown"
-    clock = (known.when - known.when.min()) / np.ptp(known.when) - 0.5
-    error = _error_of_last(np.column_stack([known.test[:, None] == np.arange(count), clock]))
-    return clock, "" if error <= TOLD_APART else "order of pressure"
+def _shifts(model: RampModel, test: np.ndarray) -> np.ndarray:
+    """Return by how much each ramp stands off the middle of the series and of its test's ramps, V (n,).
+
+    Only what exceeds the noise is scatter of the valve: to move ramps by their noise would blur the edge.
+    """
+    ramps, residual = model.ramps, model.projector @ model.ramps.y
+    count = np.bincount(test)
+    within = residual - (np.bincount(test, residual) / np.maximum(count, 1))[test]
+    squares, degrees = float(within @ within), test.size - np.count_nonzero(count) - model.drift
+    kept = max(1 - float(np.mean(ramps.se**2)) * degrees / squares, 0.0) if degrees > 0 and squares > 0 else 0.0
+    drifted = 0.0 if model.drift_V is None or ramps.clock is None else model.drift_V * ramps.clock
+    found: np.ndarray = kept * within + drifted
+    return found
 
 
-def _error_of_last(design: np.ndarray) -> float:
-    """Return the standard error of a model's last parameter over the scatter; infinite where it can't be told."""
-    rest, last = design[:, :-1].astype(float), design[:, -1].astype(float)
-    left = last - rest @ np.linalg.lstsq(rest, last, rcond=None)[0]
-    squares = float(left @ left)
-    return 1 / math.sqrt(squares) if squares > NOTHING else math.inf
+# ------------------------------------------------------------------------------------------- the premises of the model
+def find_alike_repeats(model: RampModel, test: np.ndarray, least: np.ndarray) -> AlikeRepeats | None:
+    """Return repeats whose residuals are smaller than their noise makes likely, at one pressure drop or at all of them.
+
+    Whatever the valve does, the knees of true repeats scatter by their noise at least (R,): the sum of squares over it
+    has at least a chi-squared distribution. Of true repeats one series in 1 / `AS_ALIKE` is found, Bonferroni over the
+    pressure drops and all together. Where the noise of a ramp is not known nothing is said.
+    """
+    from scipy.special import gammainc
+
+    residual, free = model.projector @ model.ramps.y, np.diag(model.projector)
+    if free.sum() <= NO_DEGREES or not (least > 0).all():
+        return None
+    groups = [np.flatnonzero(test == one) for one in np.unique(test)]
+    groups = [group for group in groups if free[group].sum() > 1 - NO_DEGREES]
+    found = []
+    for group in [*groups, np.arange(test.size)]:
+        degrees = float(free[group].sum())
+        chance = float(gammainc(degrees / 2, float(np.sum(residual[group] ** 2 / least[group])) / 2))
+        sd = math.sqrt(float(residual[group] @ residual[group]) / degrees)
+        found.append((chance * (len(groups) + 1), sd, math.sqrt(float(least[group].mean()))))
+    if not groups or min(found)[0] > AS_ALIKE:
+        return None
+    most = min(range(len(groups)), key=lambda place: found[place])
+    everywhere = found[-1][0] <= found[most][0]
+    return AlikeRepeats(int(test[groups[most][0]]), everywhere, *found[-1 if everywhere else most][1:])
 
 
-def _origin(squares: float, noise: float, degrees: int, declared: float | None, u_max: float) -> Origin:
-    """Return where the scatter is from: what is declared or assumed counts, unless the repeats contradict it."""
-    from scipy.special import chdtrc
+def find_two_groups(
+    knee: np.ndarray, test: np.ndarray, number: np.ndarray, noise: np.ndarray, switched: Sequence[Mapping[str, str]]
+) -> TwoGroups | None:
+    """Return the two groups in which the ramps' knees, V (R,), lie, if a normal scatter does not make such ones.
 
-    if declared is None and degrees >= FEWEST_DEGREES:
-        return "repeats"
-    taken = ASSUMED_REPEATABILITY * u_max if declared is None else declared
-    expected = max(taken**2 + noise, np.finfo(float).tiny)
-    if degrees > 0 and chdtrc(degrees, squares / expected) < CONTRADICTED:
-        return "repeats"
-    return "assumed" if declared is None else "declared"
+    Where a column of two values parts the ramps, one effect common to all tests is tested (Student). Elsewhere each
+    test is parted where that leaves the least squares, and the F test of it is Bonferroni's over all ways to part.
+    """
+    labels = [label for label in (switched[0] if switched else ()) if all(label in each for each in switched)]
+    for label in labels:
+        if found := _parted_by(label, [each[label] for each in switched], knee, test, number, noise, len(labels)):
+            return found
+    return _parted_best(knee, test, number, noise)
+
+
+def _parted_by(
+    label: str,
+    said: Sequence[str],
+    knee: np.ndarray,
+    test: np.ndarray,
+    number: np.ndarray,
+    noise: np.ndarray,
+    tried: int,
+) -> TwoGroups | None:
+    from scipy.special import stdtr
+
+    values = sorted(set(said))
+    if len(values) != 2:
+        return None
+    second = np.array([value == values[1] for value in said])
+    of_tests = test[:, None] == np.unique(test)
+    both = [one for one in np.unique(test) if 0 < np.count_nonzero(second[test == one]) < np.count_nonzero(test == one)]
+    degrees = knee.size - of_tests.shape[1] - 1
+    if not both or degrees < 1:
+        return None
+    mean = of_tests @ ((of_tests.T @ np.column_stack([second, knee])) / of_tests.sum(axis=0)[:, None])
+    away, rise = second - mean[:, 0], knee - mean[:, 1]
+    lever = float(away @ away)
+    effect = float(away @ rise) / lever
+    squares = max(float(np.sum((rise - effect * away) ** 2)), degrees * float(noise.mean()), np.finfo(float).tiny)
+    if 2 * tried * stdtr(degrees, -abs(effect) / math.sqrt(squares / degrees / lever)) > REFUSED:
+        return None
+    high = second if effect > 0 else ~second
+    ramps = [(int(both[0]), int(number[(test == both[0]) & each][0])) for each in (~high, high)]
+    lower, upper = values if effect > 0 else values[::-1]
+    return TwoGroups(abs(effect), (ramps[0], ramps[1]), label, (lower, upper))
+
+
+def _parted_best(knee: np.ndarray, test: np.ndarray, number: np.ndarray, noise: np.ndarray) -> TwoGroups | None:
+    from scipy.special import fdtrc
+
+    groups = [rows for one in np.unique(test) if (rows := np.flatnonzero(test == one)).size >= FEWEST_TO_PART]
+    parted = []
+    for rows in groups:
+        rows = rows[np.argsort(knee[rows], kind="stable")]
+        left = [
+            sum(float(np.sum((knee[part] - knee[part].mean()) ** 2)) for part in np.split(rows, [at]))
+            for at in range(1, rows.size)
+        ]
+        low, high = np.split(rows, [int(np.argmin(left)) + 1])
+        parted.append((min(left), float(knee[high].mean() - knee[low].mean()), low, high))
+    degrees = sum(rows.size - 2 for rows in groups)
+    if not groups:
+        return None
+    every = sum(float(np.sum((knee[rows] - knee[rows].mean()) ** 2)) for rows in groups)
+    within = max(sum(each[0] for each in parted), degrees * float(noise.mean()), np.finfo(float).tiny)
+    ratio = max(every - within, 0.0) / len(groups) / (within / degrees)
+    ways = sum((rows.size - 1) * math.log(2) for rows in groups)
+    gaps = np.array([each[1] for each in parted])
+    wide = gaps >= gaps.max() / 2
+    # One ramp that lies off is an outlier; and a gap at one pressure drop of several is a larger scatter there.
+    alone = len(groups) == 1 and min(parted[0][2].size, parted[0][3].size) < 2
+    chance = float(fdtrc(len(groups), degrees, ratio))
+    if alone or 3 * wide.sum() < 2 * wide.size or math.log(max(chance, np.finfo(float).tiny)) + ways > math.log(PARTED):
+        return None
+    _, _, low, high = parted[int(np.argmax(gaps))]
+    ends = [(int(test[part[0]]), int(number[part[0]])) for part in (low, high)]
+    return TwoGroups(float(gaps[wide].mean()), (ends[0], ends[1]))
+
+
+def find_serial_correlation(model: RampModel, when: np.ndarray) -> float | None:
+    """Return the correlation of neighbouring ramps where they are more alike than chance makes them, else None.
+
+    The test of Durbin and Watson, with the beta distribution that has the mean and the variance of their ratio for this
+    model. `when` (n,) is when each was recorded, s; NaN where that is not known.
+    """
+    from scipy.special import betainc
+
+    order = np.argsort(when, kind="stable")
+    free, residual = model.projector[np.ix_(order, order)], (model.projector @ model.ramps.y)[order]
+    degrees, squares = float(np.trace(free)), float(residual @ residual)
+    if degrees < FEWEST_IN_A_ROW - NO_DEGREES or not np.isfinite(when).all() or not np.ptp(when) > 0:
+        return None
+    if squares <= NOTHING * float(np.sum(model.ramps.se**2)):
+        return None
+    steps, difference = np.diff(residual), np.diff(np.eye(residual.size), axis=0)
+    of_steps = free @ (difference.T @ difference)
+    first, second = float(np.trace(of_steps)), float(np.sum(of_steps * of_steps.T))
+    mean = first / degrees
+    variance = 2 * (second - first * mean) / (degrees * (degrees + 2))
+    if not variance > 0:
+        return None
+    ratio, both = float(steps @ steps) / squares, mean * (4 - mean) / variance - 1
+    chance = betainc(both * mean / 4, both * (1 - mean / 4), min(ratio / 4, 1.0))
+    return float(1 - ratio / mean) if chance < REFUSED else None

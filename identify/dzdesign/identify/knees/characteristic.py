@@ -2,13 +2,10 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
-from dzdesign.identify.knees.branch_shape import BranchShape, Tail
-from dzdesign.identify.knees.dead_zone import look_into_dead_zone
-from dzdesign.identify.knees.gated_line import GATE, GatedLine, PreparedBranch, fit_line
+from dzdesign.identify.knees.gated_line import GATE, BranchShape, DeadZone, GatedLine, PreparedBranch, Tail, fit_line
 from dzdesign.identify.knees.line_fitting import inflation_by_blocks
 from dzdesign.identify.knees.linear_region import StraightParts, find_straight_parts
 from dzdesign.identify.knees.noise import measure_roughness, robust_sigma, variance_inflation
@@ -26,6 +23,17 @@ TAIL_SAMPLES = 12
 TAIL_LEVELS = 3
 #: Rounds in which censored samples of the tail are filled in and its line laid: each leaves a third of the error.
 TAIL_ROUNDS = 8
+#: Stretches of command over which readings are averaged, over u_max, and by how much of itself each is moved on: the
+#: longest sees the smallest flows, the shorter ones the steeper edges. One of them says the noise level.
+STRETCHES, STEP, OF_THE_LEVEL = (0.03, 0.015, 0.0075), 0.25, 0.015
+#: Standard errors of such an average that the noise level has, and share of the noise level from which an average is
+#: flow: noise feigns flow in one stretch of 6000, and a flow of the noise level is missed in one of 120.
+RESOLVED, SEEN = 6.0, 0.6
+#: Commands that tell what the meter reads while the valve is shut: from this share of u_max to this of the knee.
+SHUT_FROM, SHUT_TO = 0.01, 0.4
+#: Fewest readings of an average, and standard errors of the knee, and shifts by the meter's lag, that the uppermost
+#: stretch keeps off it.
+FEWEST, OFF_THE_KNEE = 10, 2.0
 
 
 def describe_branches(
@@ -67,8 +75,7 @@ def _describe(
     tail = _find_tail(read, level, line, noise, parts.correlation, u_max)
     onset, onset_se = _find_onset(read, tail, level, noise)
     if dead_zone.depth > 0:  # averages show what no reading does
-        first = line.knee - dead_zone.depth
-        tail, onset = replace(tail, at_level=min(tail.at_level, first)), min(onset, first)
+        onset = min(onset, line.knee - dead_zone.depth)
     return BranchShape(
         prepared=read,
         line=line,
@@ -158,7 +165,9 @@ def _find_tail(
     first, last = crossing(*profile, level), crossing(*profile, TAIL * level)
     hole = hole_within(profile[0], first, first, u_max)
     if hole:
-        return _tail_in_a_hole(profile[0], first, level, hole)
+        # What lies above the missing rows may be straight, and its zero far above a soft edge that nobody recorded: the
+        # valve opens no sooner than at their lower end.
+        return Tail(hole[0], float(np.median(np.diff(profile[0]))), level / (hole[1] - hole[0]), hole)
     tail = (u >= first) & (u <= last)
     seen = tail & (read.branch.q >= 0.5 * read.floor)
     if seen.sum() >= TAIL_SAMPLES and np.unique(u[seen]).size >= TAIL_LEVELS:
@@ -173,12 +182,8 @@ def _find_tail(
             by_blocks = inflation_by_blocks(residual, max(sigma, 1e-12))
             inflation = max(by_blocks, variance_inflation(correlation, roughness, sigma))
             spread = np.sum((u_tail - u_tail.mean()) ** 2)
-            at_level = onset + level / tail_slope
-            errors = [
-                sigma * math.sqrt((1 / u_tail.size + (u_tail.mean() - at) ** 2 / spread) * inflation) / tail_slope
-                for at in (onset, at_level)
-            ]
-            return Tail(onset, errors[0], tail_slope, at_level, errors[1])
+            lever = 1 / u_tail.size + (u_tail.mean() - onset) ** 2 / spread
+            return Tail(onset, sigma * math.sqrt(lever * inflation) / tail_slope, tail_slope)
     # Too few samples for a line, as in a staircase test: the chord, its ends known to one level of the command.
     at = int(np.clip(np.searchsorted(profile[0], first), 1, profile[0].size - 1))
     gap = float(profile[0][at] - profile[0][at - 1])
@@ -186,13 +191,79 @@ def _find_tail(
     chord = (TAIL - 1) * level / width
     error = gap + noise / chord
     # At the level before, less flows than counts, so the zero is not below it.
-    return Tail(max(first - level / chord, float(profile[0][at - 1])), error, chord, first, error)
+    return Tail(max(first - level / chord, float(profile[0][at - 1])), error, chord)
 
 
-def _tail_in_a_hole(u: np.ndarray, first: float, level: float, hole: tuple[float, float]) -> Tail:
-    """Return what can be said where rows are missing in which the flow begins: no sooner than at their lower end.
+def look_into_dead_zone(
+    read: PreparedBranch,
+    line: GatedLine,
+    *,
+    least: float,
+    level: float,
+    noise: float,
+    correlation: float,
+    shift: float,
+    u_max: float,
+) -> DeadZone:
+    """Average the readings below the knee.
 
-    What lies above them may be straight, and its zero far above a soft edge that nobody recorded.
+    Parameters
+    ----------
+    read, line : PreparedBranch, GatedLine
+        The branch and its straight part.
+    least : float
+        Flow that counts as no flow whatever the noise (the meter's floor, no useful flow), m³/s.
+    level : float
+        Flow from which a single reading is flow, m³/s: the noise level where averages tell nothing.
+    noise : float
+        Standard deviation of a reading while the valve is shut, m³/s.
+    correlation : float
+        Of the noise of neighbouring samples.
+    shift : float
+        What the meter's lag shifts the flow by at most, V: so near to the knee a filter rounds any edge.
+    u_max : float
+        Full command, V.
     """
-    low, high = hole
-    return Tail(low, float(np.median(np.diff(u))), level / (high - low), first, high - low, hole)
+    u, y = read.branch.u, read.y
+    order = np.argsort(u, kind="stable")
+    u, y = u[order], y[order]
+    shut = y[slice(*np.searchsorted(u, [SHUT_FROM * u_max, SHUT_TO * line.knee]))]
+    top = line.knee - OFF_THE_KNEE * (line.knee_se + shift)
+    highest = _stretch(u, top, OF_THE_LEVEL * u_max)
+    if min(shut.size, np.ptp(highest)) < FEWEST:
+        return DeadZone(level, 0.0)
+    ramps = max(len(read.branch.counts), 1)
+
+    def error(rows: tuple[int, int]) -> float:
+        # Of two means, each of so many stretches of time that are independent of one another.
+        sizes = (shut.size, rows[1] - rows[0])
+        return noise * math.sqrt(sum(_long_run(size / ramps, correlation) / size for size in sizes))
+
+    base, depth = _mean(shut, noise), 0.0
+    for share in STRETCHES:
+        stretch, end = share * u_max, top
+        while np.ptp(rows := _stretch(u, end, stretch)) >= FEWEST:
+            if _mean(y[slice(*rows)], noise) - base <= SEEN * max(least, RESOLVED * error(rows)):
+                break
+            end -= STEP * stretch
+            # Flow that ends softly is less in the middle of a stretch than on average over it.
+            depth = max(depth, line.knee - (end - stretch / 2))
+    return DeadZone(max(least, RESOLVED * error(highest)), depth)
+
+
+def _stretch(u: np.ndarray, end: float, width: float) -> tuple[int, int]:
+    """Return from which reading to which the commands, which rise, lie in a stretch that ends at a command."""
+    first, last = np.searchsorted(u, [end - width, end])
+    return int(first), int(last)
+
+
+def _long_run(count: float, correlation: float) -> float:
+    """Return the variance of the mean of so many readings in a row over what independent ones would leave."""
+    return min((1 + correlation) / (1 - correlation), max(count, 1.0))
+
+
+def _mean(values: np.ndarray, noise: float) -> float:
+    """Return the mean of readings, outliers left out."""
+    middle = median(values)
+    kept = np.abs(values - middle) <= GATE * max(noise, robust_sigma(values))
+    return float(values[kept].mean())

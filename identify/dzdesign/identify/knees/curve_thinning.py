@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dzdesign.identify.constants import L_MIN, MPA, SMALLEST_DP
-from dzdesign.identify.knees.branch_shape import BranchShape
 from dzdesign.identify.knees.described_tests import DescribedTest
+from dzdesign.identify.knees.gated_line import BranchShape
 from dzdesign.identify.knees.noise import robust_sigma
 from dzdesign.identify.knees.profile import smooth_profile
 from dzdesign.identify.ramps.branches import Branch

@@ -1,14 +1,14 @@
 """`DescribedTests`: ramp tests made comparable and described, as fits, warnings and plots take them."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from dzdesign.identify.knees.between_ramps import BetweenRamps
-from dzdesign.identify.knees.branch_shape import BranchShape
-from dzdesign.identify.knees.meter_lag import MeterLag
+from dzdesign.identify.knees.gated_line import BranchShape
+from dzdesign.identify.knees.meter import MeterLag
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.left_out import LeftOut
 
@@ -88,3 +88,26 @@ class DescribedTests:
         """Return the pace of the command on that branch of each test, V/s (T,); NaN where it is unknown."""
         shapes = [item.shapes[column] for item in self.tests]
         return np.array([shape.prepared.branch.rate if shape else math.nan for shape in shapes])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Knees:
+    """Arrays (T, 2), columns rising and falling, NaN where a branch is missing."""
+
+    #: Knees and their standard errors, coloured noise counted, V.
+    knee: np.ndarray
+    knee_se: np.ndarray
+    #: At the nominal pressure drop, m³/(s V).
+    slope: np.ndarray
+
+    @classmethod
+    def of(cls, shapes: Sequence[tuple[BranchShape | None, BranchShape | None]]) -> "Knees":
+        """Gather what the tests' rising and falling branches, in the order of rising pressure drop, say."""
+        knee, knee_se, slope = (np.full((len(shapes), 2), np.nan) for _ in range(3))
+        for row, pair in enumerate(shapes):
+            for column, shape in enumerate(pair):
+                if shape is not None:
+                    knee[row, column] = shape.knee
+                    knee_se[row, column] = shape.line.knee_se
+                    slope[row, column] = shape.slope
+        return cls(knee=knee, knee_se=knee_se, slope=slope)

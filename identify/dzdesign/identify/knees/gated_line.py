@@ -1,4 +1,4 @@
-"""`PreparedBranch`: samples of a branch; `GatedLine`: a straight line through those of them that are no outliers."""
+"""`PreparedBranch`: samples; `GatedLine`: a line through those that are no outliers; `BranchShape`: what both tell."""
 
 import math
 from dataclasses import dataclass, replace
@@ -104,3 +104,61 @@ class GatedLine:
         known = variance_inflation(correlation, self.roughness, self.sigma)
         of_this = self.block_inflation if self.block_inflation > STANDS_OUT * blocks else 1.0
         return replace(self, variance_inflation=max(of_this, blocks, known))
+
+
+@dataclass(frozen=True, slots=True)
+class DeadZone:
+    """Dead zone of one branch: the noise level, m³/s, and how far below the knee averages still show flow, V."""
+
+    noise_level: float
+    depth: float
+
+
+@dataclass(frozen=True, slots=True)
+class Tail:
+    """What the meter sees of the edge: a line through the first flows that count; commands in V, slope in m³/(s V)."""
+
+    zero: float
+    zero_se: float
+    slope: float
+    #: Commands between which rows are missing, if flow begins there: then `zero` is the lower of them.
+    hole: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BranchShape:
+    """One branch of one ramp test, described; commands in V, flows in m³/s at the nominal pressure drop."""
+
+    #: The samples that all this was found from, and the straight line through those in the knee window.
+    prepared: PreparedBranch
+    line: GatedLine
+    #: Of `prepared` and `line`.
+    y_max: float
+    slope: float
+    knee: float
+    #: Knee by the line in the window that was asked for, where the straight part is wider; else the same.
+    knee_of_window: float
+    sigma: float
+    variance_inflation: float
+    outliers: int
+    #: Standard deviation of a reading while the valve is shut, m³/s.
+    noise: float
+    #: Flow from which a single reading counts as flow: the meter's floor, its noise or `USEFUL_FLOW`, whichever is
+    #: largest.
+    level: float
+    #: What averages over the dead zone show below that.
+    dead_zone: DeadZone
+    tail: Tail
+    #: Where the valve opens (or closes), as far as the meter shows it.
+    onset: float
+    onset_se: float
+    #: Standard deviation of the spool about its mean course, as a command: stick and slip.
+    ripple: float
+    #: True if the flow at full command lies clearly below the straight line.
+    saturates: bool
+
+    @property
+    def full_flow(self) -> float:
+        """Flow at full command, m³/s: beyond the meter's range that of the straight line, unless a stop is seen."""
+        unseen = self.prepared.unseen_top
+        return self.slope * (unseen - self.knee) if unseen and not self.saturates else self.y_max

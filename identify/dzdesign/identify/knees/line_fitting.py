@@ -1,26 +1,30 @@
 """A straight line through the samples of a branch between two flows, which outliers and drop-outs do not move."""
 
+import math
+
 import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import worded
+from dzdesign.identify.constants import Shown
 from dzdesign.identify.knees.gated_line import GATE, GatedLine, PreparedBranch, fit_line
-from dzdesign.identify.knees.noise import measure_roughness
+from dzdesign.identify.knees.noise import Roughness, measure_roughness
 from dzdesign.identify.knees.profile import crossing
-from dzdesign.identify.knees.table_lines import line_through_levels
 from dzdesign.identify.ramps.medians import median
 
 #: Most rounds in which outliers are left out and the line is laid again: each finds those that the ones before hid.
 ROUNDS = 20
-#: Logarithm of the probability below which a run of readings below the floor is not the noise's: about one run in ten
-#: million, and a branch has a hundred.
-UNLIKELY = -16.0
 #: Fewest samples for a line through noise; with fewer it goes from level to level.
 FEWEST = 5
 #: Noise below this share of the largest flow is not believed: no meter is that fine.
 FINEST_NOISE = 1e-5
 #: Blocks into which the residuals in time order are cut, to see how coloured the noise is.
 BLOCKS = 16
+#: Of a standard error from these blocks, less the line's two parameters.
+DEGREES_OF_FREEDOM = BLOCKS - 2
+#: A table's flow that leaves less than `SHUT` of the largest, for more than `JUMPED`, between two levels of the
+#: command jumps if it rises so many times faster there than over the next two levels.
+SHUT, JUMPED, JUMP = 0.05, 0.15, 3.0
 
 
 def lay_line(read: PreparedBranch, window: tuple[float, float]) -> GatedLine:
@@ -63,7 +67,6 @@ def lay_line(read: PreparedBranch, window: tuple[float, float]) -> GatedLine:
     u_seen = u[seen]
     residual = _within_ramps(y[seen] - slope * (u_seen - knee), branch.ramp_of_samples[inside][seen])
     sigma = max(float(np.sqrt(np.sum(residual**2) / max(u_seen.size - 2, 1))), finest)
-    kept &= ~_runs_of_drop_outs(censored, (slope * (u - knee) - floor) / sigma, residual)
     by_blocks = inflation_by_blocks(residual, sigma)
     return GatedLine(
         window=window,
@@ -90,32 +93,6 @@ def _within_ramps(residual: np.ndarray, ramp: np.ndarray) -> np.ndarray:
     return within
 
 
-def _runs_of_drop_outs(censored: np.ndarray, above: np.ndarray, residual: np.ndarray) -> np.ndarray:
-    """Return which censored samples belong to a run that noise does not explain: a logger that was busy, a wire.
-
-    A meter with a floor reads nothing where the flow is a little above it, now and then, but not for long. Taken for
-    little flow, half a second of lost readings just above the knee lifts it, and the bounds with it.
-
-    `censored` (N,) says which samples in the order of time read below the floor, `above` (N,) how far the line is above
-    it at each, in standard deviations. The residuals (M,) of the other samples tell how slow the noise is: slow noise
-    explains longer runs.
-    """
-    edges = np.flatnonzero(np.diff(censored.astype(np.int8), prepend=0, append=0))
-    starts, ends = edges[::2], edges[1::2]
-    lost = np.zeros(censored.size, dtype=bool)
-    if not starts.size or not np.any(above[censored] > 0):
-        return lost
-    from scipy.special import log_ndtr
-
-    slow = float(np.clip(residual[1:] @ residual[:-1] / max(residual @ residual, 1e-300), 0.0, 1.0))
-    news = (1 - slow) / (1 + slow)  # share of a sample that is new, of noise that forgets exponentially
-    length = ends - starts
-    last = np.cumsum(log_ndtr(-above[censored]))[np.cumsum(length) - 1]
-    chance = np.diff(last, prepend=0.0) * (news + (1 - news) / length)
-    lost[censored] = np.repeat(chance < UNLIKELY, length)
-    return lost
-
-
 def _among(inside: np.ndarray, chosen: np.ndarray) -> np.ndarray:
     """Return which samples of all are chosen, from which of those inside the window are."""
     among = np.zeros(inside.size, dtype=bool)
@@ -139,15 +116,79 @@ def _refuse_no_line(u: np.ndarray, window: tuple[float, float], floor: float, so
     """Refuse samples that hold no straight line: too few above the meter's floor, or all at one command."""
     if u.size < FEWEST or np.ptp(u) == 0:
         raise InputError(
-            worded(
-                "'{source}': {count} samples at {levels} levels of the command lie between {low:.0%} and {high:.0%} of "
-                "the largest flow and above half the meter's floor of {floor:.3g L/min}, expected at least 5 at 2 "
-                "levels; record a slower ramp or more levels, or correct --meter-floor",
-                source=source,
-                count=u.size,
-                levels=np.unique(u).size,
-                low=window[0],
-                high=window[1],
-                floor=floor * 6e4,
-            )
+            f"'{source}': {u.size} samples at {np.unique(u).size} levels of the command lie between {window[0]:.0%} "
+            f"and {window[1]:.0%} of the largest flow and above half the meter's floor of "
+            f"{Shown(floor * 6e4):.3g L/min}, expected at least 5 at 2 levels; record a slower ramp or more levels, "
+            "or correct --meter-floor"
         )
+
+
+def line_through_levels(read: PreparedBranch, window: tuple[float, float]) -> GatedLine | None:
+    """Return the line from the last level below a window to the first above it: all that a table of few levels tells.
+
+    The zero is known to one level of the command, and its error is said to be that.
+    """
+    _refuse_a_jump_between_levels(read)
+    u, y = read.profile
+    order = np.argsort(u)
+    u, y = u[order], y[order]
+    above = int(np.searchsorted(u, crossing(u, y, window[0] * read.y_max)))
+    beyond = int(np.searchsorted(u, crossing(u, y, window[1] * read.y_max)))
+    if not 0 < above <= beyond < u.size:
+        return None
+    levels = slice(above - 1, beyond + 1)
+    slope, knee = fit_line(u[levels], y[levels])
+    step = float(np.diff(u[levels]).max())
+    if slope <= 0 or not u[above - 1] - step <= knee <= u[beyond]:
+        return None
+    kept = (read.branch.u >= u[above - 1]) & (read.branch.u <= u[beyond])
+    censored = kept & (read.branch.q < 0.5 * read.floor)
+    seen = kept & ~censored
+    u_seen = read.branch.u[seen]
+    if u_seen.size < 2 or np.ptp(u_seen) == 0:
+        return None
+    lever = 1 / u_seen.size + (u_seen.mean() - knee) ** 2 / np.sum((u_seen - u_seen.mean()) ** 2)
+    return GatedLine(
+        window=window,
+        slope=slope,
+        knee=knee,
+        lever=lever,
+        sigma=slope * step / math.sqrt(lever),
+        block_inflation=1.0,
+        variance_inflation=1.0,
+        inside=kept,
+        kept=kept,
+        censored=censored,
+        roughness=Roughness(0, 0.0, 0.0),
+        outliers=0,
+    )
+
+
+def _refuse_a_jump_between_levels(read: PreparedBranch) -> None:
+    """Refuse a table whose flow jumps from one level of the command to the next.
+
+    A valve that opens into a straight part rises from its last shut level by less than one level's worth; what rises
+    by several comes from a meter that wakes up late, and the line down to the shut level would end volts too high.
+    """
+    u, share = read.profile[0], read.profile[1] / read.y_max
+    opened = int(np.argmax(share > SHUT))
+    if opened == 0 or opened + 2 >= u.size or share[opened] < JUMPED:
+        return
+    before = (share[opened] - share[opened - 1]) / (u[opened] - u[opened - 1])
+    after = (share[opened + 2] - share[opened]) / (u[opened + 2] - u[opened])
+    if before <= JUMP * max(after, 0.0):
+        return
+    raise InputError(
+        worded(
+            "'{source}': the flow jumps between {shut:.2f #V} and {open:.2f V}, from {least:.0%} to {most:.0%} of the "
+            "largest flow of {flow:.3g L/min}, {steeper:.3g} times as steep as above it, expected a straight rise; "
+            "record levels in between, or, if the meter shows nothing below some flow, take one of a smaller range",
+            source=read.source,
+            shut=u[opened - 1],
+            open=u[opened],
+            least=max(share[opened - 1], 0.0),
+            most=share[opened],
+            flow=read.y_max * 6e4,
+            steeper=before / after if after > 0 else np.inf,
+        )
+    )

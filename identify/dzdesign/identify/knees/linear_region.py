@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.core.recorded_units import worded
+from dzdesign.identify.constants import Shown
 from dzdesign.identify.knees.gated_line import GatedLine, PreparedBranch
 from dzdesign.identify.knees.line_fitting import lay_line
 from dzdesign.identify.knees.noise import correlation_upper_limit, robust_sigma, shared_correlation
@@ -70,15 +70,9 @@ def find_straight_parts(
     for read, line in zip(reads, narrow, strict=True):
         if not line.slope > 0:
             raise InputError(
-                worded(
-                    "'{source}': between {low:.0%} and {high:.0%} of the largest flow, {flow:.3g L/min}, the flow does "
-                    "not rise with the command; look for spikes in the column of Q, leave their cells blank, or choose "
-                    "another --knee-window",
-                    source=read.source,
-                    low=window[0],
-                    high=window[1],
-                    flow=read.y_max * 6e4,
-                )
+                f"'{read.source}': between {window[0]:.0%} and {window[1]:.0%} of the largest flow, "
+                f"{Shown(read.y_max * 6e4):.3g L/min}, the flow does not rise with the command; look for spikes in "
+                "the column of Q, leave their cells blank, or choose another --knee-window"
             )
     correlation, blocks = _shared_noise(narrow)
     narrow = [line.with_shared_noise(correlation, blocks) for line in narrow]

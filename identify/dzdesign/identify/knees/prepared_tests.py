@@ -8,15 +8,12 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import worded
-from dzdesign.identify.constants import FULL_SWEEP, L_MIN, SMALLEST_DP
-from dzdesign.identify.knees.between_ramps import BetweenRamps, knees_of_ramps, pool_scatter
-from dzdesign.identify.knees.branch_shape import BranchShape
+from dzdesign.identify.constants import FULL_SWEEP, L_MIN, MPA, SMALLEST_DP, ANYWHERE_MPa, Shown
+from dzdesign.identify.knees.between_ramps import BetweenRamps, compare_ramps, knees_of_ramps
 from dzdesign.identify.knees.characteristic import describe_branches
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
-from dzdesign.identify.knees.gated_line import prepare_branch
-from dzdesign.identify.knees.meter_floor import find_meter_floor, known_floor
-from dzdesign.identify.knees.meter_lag import MeterLag, find_lag
-from dzdesign.identify.knees.mixed_branches import refuse_mixed_branches
+from dzdesign.identify.knees.gated_line import BranchShape, prepare_branch
+from dzdesign.identify.knees.meter import MeterLag, find_lag, find_meter_floor, known_floor
 from dzdesign.identify.knees.profile import largest_at_top
 from dzdesign.identify.knees.readings_at_rest import find_rest_flows, hidden_zero
 from dzdesign.identify.knees.refusals import (
@@ -26,6 +23,7 @@ from dzdesign.identify.knees.refusals import (
     refuse_a_wrong_pressure,
     refuse_an_impossible_knee,
     refuse_an_open_valve,
+    refuse_mixed_branches,
     refuse_two_directions,
     refuse_two_signs_of_flow,
 )
@@ -72,7 +70,7 @@ def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> Descr
     known = known_floor(tests, options)
     floor = found_floor(pooled, options) if known is None else known
     described = _described(pooled, floor, lag, options)
-    refuse_mixed_branches(described, tests)
+    refuse_mixed_branches(described)
     between = [_between_ramps(described, column, options) for column in (0, 1)]
     if any(np.any(shift != 0) for found in between if found for shift in found.shifts):
         moved = [_with_ramps_together(item, row, between) for row, item in enumerate(pooled)]
@@ -143,15 +141,9 @@ def _refuse_what_has_no_pressure(ramp: Ramp, u_max: float) -> None:
 
 def _no_ramp(test: RampTest) -> InputError:
     return InputError(
-        worded(
-            "'{source}' holds no ramp of the command from near zero up: it runs from {low:.2f #V} to {high:.2f V}, "
-            "expected a sweep over half of the command at least, without jumps; record it so, from below the threshold"
-            "{share}",
-            source=test.source,
-            low=test.u.min(),
-            high=test.u.max(),
-            share=_if_it_is_a_share(test),
-        )
+        f"'{test.source}' holds no ramp of the command from near zero up: it runs from {Shown(test.u.min()):.2f #V} "
+        f"to {Shown(test.u.max()):.2f V}, expected a sweep over half of the command at least, without jumps; record "
+        f"it so, from below the threshold{_if_it_is_a_share(test)}"
     )
 
 
@@ -204,9 +196,12 @@ def _between_ramps(described: list[DescribedTest], column: int, options: Identif
     shapes = [shape for item in described if (shape := item.shapes[column])]
     if not shapes:
         return None
-    declared = None if options.repeatability is None else options.repeatability * options.u_max
-    known = knees_of_ramps(shapes, [item.when for item in described], [item.switched for item in described])
-    return pool_scatter(known, [len(item.when) for item in described], declared=declared, u_max=options.u_max)
+    known = knees_of_ramps(
+        shapes, [item.ramps for item in described], [item.when for item in described],
+        [item.switched for item in described],
+    )  # fmt: skip
+    dp_MPa = np.array([ANYWHERE_MPa if item.dp is None else item.dp / MPA for item in described])
+    return compare_ramps(known, dp_MPa, [len(item.when) for item in described], options)
 
 
 def _with_ramps_together(item: PooledTest, row: int, between: Sequence[BetweenRamps | None]) -> PooledTest:

@@ -6,7 +6,8 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import worded
-from dzdesign.identify.constants import L_MIN, LARGEST_DP, MPA, SMALLEST_DP
+from dzdesign.identify.constants import L_MIN, LARGEST_DP, MPA, SMALLEST_DP, Shown
+from dzdesign.identify.knees.described_tests import DescribedTest
 from dzdesign.identify.knees.gated_line import PreparedBranch
 from dzdesign.identify.knees.noise import robust_sigma
 from dzdesign.identify.knees.profile import crossing, largest_flow
@@ -85,32 +86,18 @@ def refuse_a_wrong_pressure(source: str, dp: float | None, sign: DropSign = 1) -
         return
     if 0 < dp < SMALLEST_DP or dp > LARGEST_DP:
         raise InputError(
-            worded(
-                "'{source}': the pressure drop is {dp:.3g MPa}, expected {least:g #MPa} to {most:g MPa}; correct the "
-                "unit in the header (mPa is a thousandth of a pascal)",
-                source=source,
-                dp=dp / MPA,
-                least=SMALLEST_DP / MPA,
-                most=LARGEST_DP / MPA,
-            )
+            f"'{source}': the pressure drop is {Shown(dp / MPA):.3g MPa}, expected {Shown(SMALLEST_DP / MPA):g #MPa} "
+            f"to {Shown(LARGEST_DP / MPA):g MPa}; correct the unit in the header (mPa is a thousandth of a pascal)"
         )
     if dp <= 0 and sign < 0:
         raise InputError(
-            worded(
-                "'{source}': the pressure drop is {dp:.3f MPa} as recorded, expected below zero as elsewhere in the "
-                "recording at commands of that sign; correct the sign of dP, or leave out that part",
-                source=source,
-                dp=-dp / MPA,
-            )
+            f"'{source}': the pressure drop is {Shown(-dp / MPA):.3f MPa} as recorded, expected below zero as "
+            "elsewhere in the recording at commands of that sign; correct the sign of dP, or leave out that part"
         )
     if dp <= 0:
         raise InputError(
-            worded(
-                "'{source}': the pressure drop is {dp:.3f MPa}, expected a positive one; swap pA and pB, or correct "
-                "the sign of dP",
-                source=source,
-                dp=dp / MPA,
-            )
+            f"'{source}': the pressure drop is {Shown(dp / MPA):.3f MPa}, expected a positive one; swap pA and pB, or "
+            "correct the sign of dP"
         )
 
 
@@ -182,16 +169,10 @@ def refuse_a_shut_valve(test: RampTest, branches: Sequence[Branch | None], u_max
                 )
             )
         raise InputError(
-            worded(
-                "'{source}': the flow does not show the valve opening. From zero command to {top:.2f V} the flow rises "
-                "by {rise:.3f L/min}, expected more than {least:.3f #L/min} (6 times the meter's noise of "
-                "{noise:.3f L/min}); check the solenoid, the supply and the column of Q, or average the readings",
-                source=source,
-                top=branch.u.max(),
-                rise=rise / L_MIN,
-                least=least / L_MIN,
-                noise=noise / L_MIN,
-            )
+            f"'{source}': the flow does not show the valve opening. From zero command to "
+            f"{Shown(branch.u.max()):.2f V} the flow rises by {Shown(rise / L_MIN):.3f L/min}, expected more than "
+            f"{Shown(least / L_MIN):.3f #L/min} (6 times the meter's noise of {Shown(noise / L_MIN):.3f L/min}); "
+            "check the solenoid, the supply and the column of Q, or average the readings"
         )
 
 
@@ -217,18 +198,10 @@ def refuse_a_jump(read: PreparedBranch, u_max: float) -> None:
     if np.mean((share > MIDDLE[0]) & (share < MIDDLE[1])) >= FEWEST_IN_THE_MIDDLE:
         return
     raise InputError(
-        worded(
-            "'{source}': the flow jumps at {at:.2f V}, expected a straight rise. Of {count} readings there, almost "
-            "none lies between {least:.0%} and {most:.0%} of the largest flow of {flow:.3g L/min}. Either the valve "
-            "only switches, or the meter starts above that flow; use a meter of a smaller range, or leave out this "
-            "pressure drop",
-            source=read.source,
-            at=0.5 * (low + high),
-            count=inside.sum(),
-            least=MIDDLE[0],
-            most=MIDDLE[1],
-            flow=read.y_max / L_MIN,
-        )
+        f"'{read.source}': the flow jumps at {Shown(0.5 * (low + high)):.2f V}, expected a straight rise. Of "
+        f"{inside.sum()} readings there, almost none lies between {MIDDLE[0]:.0%} and {MIDDLE[1]:.0%} of the largest "
+        f"flow of {Shown(read.y_max / L_MIN):.3g L/min}. Either the valve only switches, or the meter starts above "
+        "that flow; use a meter of a smaller range, or leave out this pressure drop"
     )
 
 
@@ -248,4 +221,41 @@ def refuse_an_impossible_knee(branch: Branch, knee: float, source: str, u_max: f
             lowest=lowest,
             highest=highest,
         )
+    )
+
+
+def refuse_mixed_branches(described: Sequence[DescribedTest]) -> None:
+    """Refuse tests of which some have a branch that others lack: they can't be compared.
+
+    A test's branch may be a test of its own, at the pressure drop that the pump had come up to by then.
+    """
+    for column, name in ((0, "rising"), (1, "falling")):
+        lacking = [item for item in described if item.shapes[column] is None]
+        if not lacking or len(lacking) == len(described):
+            continue
+        item, remedy = lacking[0], "record every pressure drop up and down, or leave that file out"
+        remedy = _pressure_on_its_way(item, column, described) or remedy
+        raise InputError(f"'{item.test.source}' has no {name} branch while other ramp tests have one; {remedy}")
+
+
+def _pressure_on_its_way(item: DescribedTest, column: int, described: Sequence[DescribedTest]) -> str | None:
+    """Return what to say where the branch that a test lacks was run at another pressure drop, in the same recording."""
+    other = next(
+        (
+            each
+            for each in described
+            if each is not item
+            and set(each.files) & set(item.files)
+            and each.shapes[column] is not None
+            and each.shapes[1 - column] is None
+        ),
+        None,
+    )
+    if other is None or other.dp is None or item.dp is None:
+        return None
+    source = next(file for file in item.files if file in other.files)[0]
+    return (
+        f"in '{source}' the pressure drop was {Shown(other.dp / MPA):.3g #MPa} on that branch, and "
+        f"{Shown(item.dp / MPA):.3g MPa} on the other one, so it is another test. Start the ramp after the pressure "
+        "has settled and record again, or leave that file out"
     )

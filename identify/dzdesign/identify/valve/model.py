@@ -14,9 +14,12 @@ from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
 from dzdesign.identify.valve.quantity_types import Flow, Probability
 from dzdesign.identify.valve.side_model import SideModel
-from dzdesign.identify.valve.stated_options import StatedOptions
 from dzdesign.identify.valve.test_record import LONGEST_NAME, LONGEST_TEXT, MOST_ENTRIES, checked_record
 
+#: Of texts of an option, and of names of files in a table or a list.
+LONGEST = 4096
+Name = Annotated[str, Meta(min_length=1, max_length=LONGEST)]
+Words = Annotated[str, Meta(max_length=LONGEST)]
 #: Both sides, and the sign of the command that opens each.
 SIDES = {"positive": 1, "negative": -1}
 #: How the lag of a flow meter is known, for people.
@@ -24,6 +27,20 @@ KNOWN_BY = {"declared": "declared", "identified": "from ramps of two rates", "un
 LagOrigin = Literal["declared", "identified", "unknown"]
 #: Decimals of every number in valve.json: below every error here, and the same bytes on every machine.
 DECIMALS = 7
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StatedOptions:
+    """Options of `identify` as entered, defaults included; an option without a value is omitted."""
+
+    texts: Annotated[Mapping[Name, Words], Meta(description="Options with one text value, such as meter_lag.")] = field(
+        default_factory=dict
+    )
+    tables: Mapping[Name, Mapping[Name, Words]] = field(default_factory=dict)
+    """Options given as a table, such as columns, or dp by the recording's name."""
+    lists: Mapping[Name, tuple[Words, ...]] = field(default_factory=dict)
+    """Options with several text values. The list of `order` holds the recordings in the order in which they were
+    taken."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

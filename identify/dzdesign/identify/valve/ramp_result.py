@@ -1,25 +1,65 @@
 """`TestResult`: what one ramp test shows, an entry of ``tests`` in valve.json."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated
 
+import numpy as np
 from msgspec import UNSET, Meta, UnsetType
 
 from dzdesign.core.artefact_types import RuleError, quantity
 from dzdesign.identify.valve.left_out import LeftOut
 from dzdesign.identify.valve.quantity_types import Flow, FlowGain, PressureDrop, Ratio, Voltage, VoltageError
-from dzdesign.identify.valve.ramp_conditions import RampConditions
 from dzdesign.identify.valve.recorded_curve import RecordedCurve
 
+#: Significant digits of a rate: a recording's clock tells no more.
+DIGITS = 4
+LARGEST = 1e9
 #: Standard errors by which closing must lie above opening to be no noise; and V, for a simulation has almost none.
 ORDER_SIGNIFICANCE, ORDER_LEAST_V = 5.0, 1e-3
-#: Of a branch: the thresholds, each with its standard error.
-THRESHOLDS = ("knee", "level", "onset")
 BRANCHES = ("rising", "falling")
 
 StandardError = Annotated[VoltageError | None, Meta(description="Standard error of this threshold.")]
 LinearRange = tuple[Ratio, Ratio]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RampConditions:
+    """Pace and sampling of the ramps of one test."""
+
+    rate_V_s: Annotated[float, quantity("V/s", ge=0, le=LARGEST)] | None
+    """Rate of the command ramp, the fastest if there are several; null if unknown."""
+    sampling_Hz: Annotated[float, quantity("Hz", ge=0, le=LARGEST)] | None
+    """Number of samples used per second. If several rows of a file became one sample, their medians count. Null: no
+    time was recorded."""
+    samples: Annotated[int, Meta(ge=0, le=10**12)]
+    """Number of samples used, over all ramps."""
+
+
+def conditions_of(rates_V_s: Sequence[float], time_s: np.ndarray) -> RampConditions:
+    """Return the conditions of a test from the paces of its branches and the times (N,) of its samples.
+
+    A pace that is not known is NaN; where the time falls, another ramp begins.
+
+    Examples
+    --------
+    >>> conditions_of([0.5, float("nan")], np.array([0.0, 0.01, 0.02, 0.0, 0.01]))
+    RampConditions(rate_V_s=0.5, sampling_Hz=100.0, samples=5)
+    """
+    known = [rate for rate in rates_V_s if math.isfinite(rate) and rate > 0]
+    steps = np.diff(time_s)
+    steps = steps[steps > 0]
+    interval = float(np.median(steps)) if steps.size else 0.0
+    return RampConditions(
+        rate_V_s=_significant(max(known)) if known else None,
+        sampling_Hz=_significant(1 / interval) if interval > 1 / LARGEST else None,
+        samples=int(time_s.size),
+    )
+
+
+def _significant(value: float) -> float:
+    return float(f"{value:.{DIGITS}g}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,9 +78,6 @@ class TestResult:
     u_knee_rising_V: Voltage | None
     """Knee on opening: the straight part of Q/sqrt(dP), extrapolated to zero flow."""
     u_knee_rising_se_V: StandardError
-    u_level_rising_V: Voltage | None
-    """Level on opening: the command at which the flow reaches the noise level."""
-    u_level_rising_se_V: StandardError
     u_onset_rising_V: Voltage | None
     """Onset on opening, as far as the meter shows it. It is the first flow above the meter's noise, or the tail
     extrapolated to zero, whichever is lower."""
@@ -50,9 +87,6 @@ class TestResult:
     u_knee_falling_V: Voltage | None
     """Knee on closing: the straight part of Q/sqrt(dP), extrapolated to zero flow."""
     u_knee_falling_se_V: StandardError
-    u_level_falling_V: Voltage | None
-    """Level on closing: the command at which the flow reaches the noise level."""
-    u_level_falling_se_V: StandardError
     u_onset_falling_V: Voltage | None
     """Onset on closing: the command of the last flow that the meter shows."""
     u_onset_falling_se_V: StandardError
@@ -101,11 +135,6 @@ class TestResult:
     """Recording conditions. Omitted if they were not kept."""
 
     def __post_init__(self) -> None:
-        for branch in BRANCHES:
-            keys = [f"u_{name}_{branch}_{unit}" for name in THRESHOLDS for unit in ("V", "se_V")]
-            known = {getattr(self, key) is not None for key in (*keys, f"straight_{branch}")}
-            if len(known) > 1:
-                raise RuleError(f"'{self.source}' has some thresholds of its {branch} branch and lacks others")
         errors = [error for error in (self.u_knee_rising_se_V, self.u_knee_falling_se_V) if error is not None]
         if not errors:
             raise RuleError("a test has no knee, neither rising nor falling; expected at least one")

@@ -34,10 +34,6 @@ class RecordedSamples:
     q_L_min: Annotated[tuple[SignedFlow, ...], quantity("L/min")]
     """Flow of each sample as read, corrected for the meter's lag and zero error; a leak is included."""
 
-    def __post_init__(self) -> None:
-        if len(self.u_V) != len(self.q_L_min):
-            raise RuleError(f"{len(self.u_V)} commands of samples stand beside {len(self.q_L_min)} flows")
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecordedBranch:

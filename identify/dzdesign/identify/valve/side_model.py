@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, get_args
+from typing import Annotated, Literal, get_args
 
 import numpy as np
 from msgspec import Meta
@@ -10,8 +10,8 @@ from msgspec import Meta
 from dzdesign.core.artefact_types import RuleError, quantity
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.identify.constants import Direction
-from dzdesign.identify.valve.guard_curve import GUARDS, ROUNDING_V, CertifiedCurve, Guard, OpeningCurve
-from dzdesign.identify.valve.identified_curve import BETA_ROUNDING, IDENTIFIED, IdentifiedCurve
+from dzdesign.identify.fit.scatter import Origin
+from dzdesign.identify.valve.guard_curve import GUARDS, CertifiedCurve, Guard, OpeningCurve
 from dzdesign.identify.valve.low_flow import LowFlow
 from dzdesign.identify.valve.quantity_types import (
     Flow,
@@ -24,13 +24,74 @@ from dzdesign.identify.valve.quantity_types import (
 )
 from dzdesign.identify.valve.ramp_result import TestResult
 from dzdesign.identify.valve.recorded_drop import RecordedDrop
-from dzdesign.identify.valve.repeatability import Repeatability
 
+NoDrift = Literal["", "one pressure drop", "order unknown", "order of pressure"]
+#: The branches, by what the valve does on them.
+IDENTIFIED = ("closing", "opening")
 #: What bounds answer for over the declared zero flow, above which it is said to be more.
 PROMISED = 1.001
-#: valve.json has seven decimals, L/min.
-ROUNDING_L_MIN = 1e-6
 DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class IdentifiedCurve:
+    """Thresholds (knees) of one branch by the fit of the side, and their ratio of Eq. (5); one entry for each test."""
+
+    dp_MPa: Annotated[tuple[PressureDrop, ...], quantity("MPa")]
+    """Tested pressure drops; empty if the pressure drop is unknown."""
+    u_V: Annotated[tuple[Voltage, ...], quantity("V")]
+    """Threshold u_min at each test: the knee as fitted under the premise."""
+    u_se_V: Annotated[tuple[VoltageError, ...], quantity("V")]
+    """Standard error of the threshold by noise, scatter from ramp to ramp, and the width of the straight part."""
+    beta: Annotated[tuple[IdentifiedRatio, ...], quantity("1")]
+    """Threshold relative to that at dP0 (Eq. 5); empty if the pressure drop is unknown."""
+    beta_se: Annotated[tuple[RatioError, ...], quantity("1")]
+    """Standard error of beta; 0 at dP0."""
+
+    def __post_init__(self) -> None:
+        lengths = {len(self.u_V), len(self.u_se_V), *((len(self.dp_MPa),) if self.dp_MPa else ())}
+        if len(lengths) > 1 or not self.u_V or not len(self.beta) == len(self.beta_se) == len(self.dp_MPa):
+            raise RuleError(
+                f"{len(self.u_V)} identified thresholds stand beside {len(self.u_se_V)} errors, {len(self.beta)} beta "
+                f"and {len(self.dp_MPa)} pressure drops, expected one each"
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Repeatability:
+    """Scatter of the guarded threshold from ramp to ramp, and its drift through the series of ramps."""
+
+    sd_V: VoltageError
+    """Standard deviation of the threshold from ramp to ramp."""
+    origin: Origin
+    """Origin of the standard deviation: measured on repeats, declared by --repeatability, or assumed by dzdesign."""
+    degrees_of_freedom: Annotated[float, quantity("1", gt=0, le=1e9)] | None
+    """Degrees of freedom of a measured standard deviation; null if it was not measured."""
+    drift_V: Voltage | None
+    """Change of the threshold from the first ramp of the series to the last; null if the model has no drift. The
+    thresholds refer to the middle of the series, and the bounds hold at both ends."""
+    drift_se_V: VoltageError | None
+    """Standard error of drift_V."""
+    no_drift: NoDrift
+    """Reason why the model has no drift; empty if it has one."""
+
+    def in_words(self, units: RecordedUnits) -> str:
+        """Return by how much the guarded threshold scatters from ramp to ramp, and drifts, and how that is known."""
+        how = {
+            "repeats": f"from repeated ramps, {self.degrees_of_freedom or 0:.0f} degrees of freedom",
+            "declared": "declared",
+            "assumed": "assumed, too few repeated ramps",
+        }
+        drift = (
+            f"drift from the first ramp to the last: {units.number(1e3 * self.drift_V, '+.1f mV')} ± "
+            f"{units.text(1e3 * self.drift_se_V, '.1f mV')}"
+            if self.drift_V is not None and self.drift_se_V is not None
+            else f"no drift in the model ({self.no_drift})"
+        )
+        return (
+            f"standard deviation {units.text(1e3 * self.sd_V, '.1f mV')} ({how[self.origin]}), included in "
+            f"the bounds; {drift}"
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,8 +173,6 @@ class SideModel:
     """Basis of the lower bounds."""
     low_flow: tuple[LowFlow, ...]
     """Flows measured by hand below the meter's floor, by --low-flow."""
-    active_constraints: tuple[str, ...]
-    """Constraints that are active in the fits, in words."""
     identified: Annotated[
         Mapping[str, IdentifiedCurve], Meta(extra_json_schema={"propertyNames": {"enum": list(IDENTIFIED)}})
     ]
@@ -134,68 +193,20 @@ class SideModel:
                 f"the guard is '{self.certificate.guard}' and there are curves of {', '.join(self.certified) or 'none'}"
                 f", expected the guard among them, and no others than {', '.join(GUARDS)}"
             )
-        dp = self.curve.dp_MPa
-        if dp and (self.reference.dp_MPa is None or any(test.dp_MPa is None for test in self.tests)):
-            raise RuleError("a pressure drop is missing beside those of a curve; expected one per test and dP0")
-        for guard in self.certified.values():
-            self._check_nodes(guard.dp_MPa, len(guard.u_lower_V))
-            guard.check_offset(self.trend or "flat", self.reference.dp_MPa)
-            guard.check_above()
-        self._check_guarded()
-        self._check_zero_flow()
-        self._check_identified()
-        if self.opening_curve is not None:
-            self._check_nodes(self.opening_curve.dp_MPa, len(self.opening_curve.u_V))
-            self.opening_curve.check_order(self.trend or "flat", tuple(self.certified.values()))
-        of_guarded = self.identified[self.certificate.guard]
-        beta = BetaNodes(dp_MPa=of_guarded.dp_MPa, beta=of_guarded.beta, beta_se=of_guarded.beta_se)
-        object.__setattr__(self, "beta", beta)
-        object.__setattr__(self, "valid_dp_MPa", (dp[0], dp[-1]) if dp else None)
-
-    def _check_nodes(self, nodes: tuple[float, ...], count: int) -> None:
-        """Check that a curve has one node a test, at its pressure drop; where that is unknown, none."""
-        if count != len(self.tests) or len(nodes) != len(self.curve.dp_MPa):
-            raise RuleError(f"a curve has {count} thresholds for {len(self.tests)} tests, expected one each")
-        for test, node in zip(self.tests if nodes else (), nodes, strict=True):
-            if test.dp_MPa is None or abs(test.dp_MPa - node) > ROUNDING_V:
-                raise RuleError("the nodes of a curve must stand at the tests' pressure drops")
-
-    def _check_guarded(self) -> None:
-        """Check that the tests repeat the guard's curve."""
-        guard, curve = self.certificate.guard, self.curve
-        for test, threshold, bound in zip(self.tests, curve.u_threshold_V, curve.u_lower_V, strict=True):
-            if abs(test.u_guard_V - threshold) > ROUNDING_V or abs(test.u_guard_lower_V - bound) > ROUNDING_V:
-                raise RuleError(f"the tests' guarded thresholds and bounds are not those of the {guard} curve")
-
-    def _check_zero_flow(self) -> None:
-        """Check that every test answers for the declared flow at zero, or none does."""
-        declared = self.certificate.zero_flow_L_min
-        for test in self.tests:
-            allowed = test.zero_flow_L_min
-            if (allowed is None) != (declared is None) or (allowed or 0.0) < (declared or 0.0) - ROUNDING_L_MIN:
-                raise RuleError(
-                    f"a test answers for a flow at zero of {allowed} L/min beside a declared one of {declared} L/min, "
-                    "expected as much or more, and none where none is declared"
-                )
-
-    def _check_identified(self) -> None:
-        """Check that there is a curve for the guarded branch, one node a test, and that the reference repeats it."""
         guard = self.certificate.guard
         if guard not in self.identified or not set(self.identified) <= set(IDENTIFIED):
             raise RuleError(
                 f"there are identified thresholds on {', '.join(self.identified) or 'no branch'}, expected the guarded "
                 f"one's, {guard}, and no others than {', '.join(IDENTIFIED)}"
             )
-        for each in self.identified.values():
-            self._check_nodes(each.dp_MPa, len(each.u_V))
-        known = self.identified[guard]
-        places = [0.0] if self.reference.dp_MPa is None else [abs(dp - self.reference.dp_MPa) for dp in known.dp_MPa]
-        row = places.index(min(places)) if places else 0
-        pairs = ((self.reference.u_min_V, known.u_V[row]), (self.reference.u_min_se_V, known.u_se_V[row]))
-        if any(abs(stated - found) > ROUNDING_V for stated, found in pairs):
-            raise RuleError(f"the reference's u_min_V is {self.reference.u_min_V:g} V, not the identified threshold")
-        if known.beta and abs(known.beta[row] - 1) > BETA_ROUNDING:
-            raise RuleError(f"beta at dP0 is {known.beta[row]:g}, expected 1")
+        for curve in self.certified.values():
+            curve.check_offset(self.trend or "flat")
+        if self.opening_curve is not None:
+            self.opening_curve.check_order(self.trend or "flat", tuple(self.certified.values()))
+        dp, of_guarded = self.curve.dp_MPa, self.identified[guard]
+        beta = BetaNodes(dp_MPa=of_guarded.dp_MPa, beta=of_guarded.beta, beta_se=of_guarded.beta_se)
+        object.__setattr__(self, "beta", beta)
+        object.__setattr__(self, "valid_dp_MPa", (dp[0], dp[-1]) if dp else None)
 
     def premise_in_words(self, units: RecordedUnits) -> str:
         """Return what the bounds between the tests rest on."""

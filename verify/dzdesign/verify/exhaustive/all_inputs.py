@@ -18,7 +18,7 @@ from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.lot_setting import NAMED
 from dzdesign.design.lot_valves import LotSide
-from dzdesign.identify.valve.above_tests import AboveTests
+from dzdesign.identify.valve.guard_curve import AboveTests
 from dzdesign.verify import requirements
 from dzdesign.verify.closed_loop.ramps import Curves, input_map_name, zero_command_name
 from dzdesign.verify.evidence import AboveCheck, InputCheck, InputCounts, LotCheck, OutputChecks, TriedInputs
