@@ -12,7 +12,7 @@ from dzdesign.assess.quantities import Change, LimitResult, Quantity, Reading
 from dzdesign.core.artefact_types import Artefact, RuleError, SourceFile, quantity
 from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
 from dzdesign.identify.valve.model import Warning_
-from dzdesign.identify.valve.ramp_conditions import RampConditions
+from dzdesign.identify.valve.ramp_result import RampConditions
 
 TERMS = (
     "terms as in tests of hydraulic valves (ISO 10770-1); the formulas are dzdesign's own, and no conformity with a "
