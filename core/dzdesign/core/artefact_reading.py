@@ -110,7 +110,7 @@ def _sentence(error: ValidationError, document: dict[str, Any], kind: type[Artef
     what = re.sub("^Invalid enum.*", "expected another word", what).replace("`", "").replace("Expected", "expected", 1)
     if is_key:
         return f": '{_written(path[:-1])}' has the key {quoted(path[-1])}, {what}"
-    value = document
+    value: Any = document
     for step in path:
         value = value[step]
     return f": '{_written(path)}' is {quoted(value)}, {what}"
