@@ -65,7 +65,7 @@ def _about_the_zero_flow(side: SideModel, group: DescribedTests) -> Iterator[War
     worst = max(side.tests, key=lambda test: test.zero_flow_L_min or 0.0)
     numbers = {"declared_L_min": declared, "allowed_L_min": allowed}
     if max(group.leak) > 0 and max(rest) > declared:
-        above = [(test.dp_MPa, flow) for test, flow in zip(side.tests, rest, strict=True) if flow > declared]
+        above = [(test.dp_MPa or 0.0, flow) for test, flow in zip(side.tests, rest, strict=True) if flow > declared]
         places = ", ".join(f"{Shown(dp):.3g #MPa}" for dp, _ in above[:-1])
         flows = ", ".join(f"{Shown(flow):.3g #L/min}" for _, flow in above[:-1])
         comma = ", " if len(above) > 1 else ""

@@ -198,7 +198,7 @@ def _by_ramps(
 
 
 def _floor(value: float) -> float:
-    return float(math.floor(value * 10**DECIMALS)) / 10**DECIMALS
+    return math.floor(value * 10.0**DECIMALS) / 10.0**DECIMALS
 
 
 def _ceil(values: np.ndarray | float) -> np.ndarray:
