@@ -161,7 +161,7 @@ def test_a_guard_that_is_none_is_refused_in_a_file(example_compensator, tmp_path
     path = tmp_path / "edited.json"
     path.write_text(json.dumps(document))
     assert main(["codegen", str(path), "--target", "host", "-o", str(tmp_path / "fw")]) == 2
-    assert "expected 'closing', 'mean' or 'opening'" in capsys.readouterr().err and not (tmp_path / "fw").exists()
+    assert "'sides.positive.certificate.guard' is" in capsys.readouterr().err and not (tmp_path / "fw").exists()
 
 
 def test_the_integers_of_the_drive_functions():

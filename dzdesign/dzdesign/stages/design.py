@@ -115,7 +115,7 @@ def given_compensator(given: "Compensator | AnyPath") -> tuple["Compensator", st
     if isinstance(given, Compensator):
         return given, sha256_of(to_json_bytes(given)), "the compensator"
     path = Path(given)
-    path = path / COMPENSATOR_NAME if path.is_dir() else path
+    path = path / COMPENSATOR_NAME if os.path.isdir(path) else path  # False of a name that is too long
     content = read_bytes(path, "compensator file")
     return read_artefact(content, Compensator, os.fspath(path)), sha256_of(content), f"'{path}'"
 

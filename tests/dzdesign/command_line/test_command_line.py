@@ -270,7 +270,6 @@ def test_colour_is_for_terminals_and_for_who_asks(monkeypatch):
         ("identify rmps/*.csv", "no file matches 'rmps/*.csv' (did you mean 'ramps'?)"),
         ("identify ramp.csv --columns 'u=U_V'", "has no column 'U_V', which --columns names for u"),
         ("identify ramp.csv --columns 'u=U_V'", "(did you mean 'u_V'?)"),
-        ("identify ramp.csv --meter-lag '0.1 sekond'", "(did you mean 'second'?)"),
     ],
 )
 def test_a_near_miss_is_named(line, hint, ramp_file, tmp_path, monkeypatch, capsys):

@@ -10,7 +10,7 @@ import pytest
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import write_file
 from dzdesign.core.artefact_types import RuleError
-from dzdesign.identify.valve.guard_curve import AboveTests
+from dzdesign.identify.valve.bound_proof import BoundProof
 from tests.support.paths import ROOT
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="shells, devices and limits of Linux")
@@ -102,7 +102,7 @@ def test_a_result_that_dzdesign_refuses_itself_is_its_own_fault(tmp_path, monkey
     def refuse(*_):
         raise RuleError("the bound does not follow")
 
-    monkeypatch.setattr(AboveTests, "check", refuse)
+    monkeypatch.setattr(BoundProof, "check", refuse)
     ramps = [str(RAMPS / f"ramp_dP{dp}_1.csv.gz") for dp in (1, 5)]
     assert main(["identify", *ramps, "--curve", "line", "-o", str(tmp_path / "valve.json")]) == 1
     *_, last = capsys.readouterr().err.strip().splitlines()

@@ -99,7 +99,7 @@ class BoundProof:
     roof: Deviations | None
     """Standard deviations from the sums of the ramps to their roofs; null if nothing is certified between the tests."""
     floor_unlike: Deviations | None
-    """The roof at the knot that scatters more."""
+    """The floor at the knot that scatters more."""
     roof_unlike: Deviations | None
     """The roof at the knot that scatters more."""
     declared: Literal["line", "smooth", "monotone"] | None
@@ -152,7 +152,10 @@ class BoundProof:
 
     def check(self, dp_MPa: Sequence[float], bound_V: Sequence[float]) -> None:
         """Refuse a bound that lies above what its multipliers prove."""
-        nodes, proved = self.bound()
+        try:
+            nodes, proved = self.bound()
+        except (ArithmeticError, IndexError, np.linalg.LinAlgError) as error:  # of an edited file
+            raise RuleError("knots, states and rows of the proof are not those of its ramps") from error
         if dp_MPa and (len(dp_MPa) != nodes.size or np.any(np.abs(nodes - dp_MPa) > ROUNDING_V)):
             raise RuleError("the nodes of the bound do not follow from the pressure drops of its ramps")
         above = np.array(bound_V) - proved
