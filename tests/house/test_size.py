@@ -13,16 +13,16 @@ from tests.support.paths import ROOT
 ROOM_SIZES = {
     "core": (2500, 15, 0),
     "derivation": (4704, 28, 325),
-    "identify": (16071, 93, 1064),
+    "identify": (16090, 93, 1064),
     "assess": (1577, 8, 0),
     "design": (6662, 30, 0),
     "codegen": (7405, 50, 7308),
-    "verify": (9586, 53, 2057),
+    "verify": (9593, 53, 2057),
     "report": (4416, 20, 532),
-    "dzdesign": (8704, 59, 156),
+    "dzdesign": (8718, 59, 156),
 }
 #: Lines of Python of what is not shipped, and of the files that the tests compare with.
-TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 45000, 13887, 8473
+TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 45008, 13887, 8473
 #: Options of all commands together; an option of two commands counts twice.
 OPTIONS = 161
 #: What a number may be above what is there, before it is to be lowered.

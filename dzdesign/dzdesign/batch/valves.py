@@ -12,10 +12,8 @@ from dzdesign.core.documents import read_bytes
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.identify.valve.test_record import checked_record
 from dzdesign.report.lot.table import NAME, RECORD, by_name
-from dzdesign.stages.recordings import expand
+from dzdesign.stages.recordings import expand, recordings_in
 
-#: What recordings are called in a valve's folder where no --pattern says so; notes and photographs may lie beside them.
-RECORDINGS = ("csv", "txt", "tsv", "dat", "gz", "tdms", "mat", "h5", "hdf5", "parquet", "feather", "arrow")
 RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
 
 
@@ -85,8 +83,8 @@ def _of_folder(folder: Path, pattern: str | None) -> list[Valve]:
 
 
 def _recordings_in(folder: Path, pattern: str | None) -> list[str]:
-    found = folder.glob(pattern) if pattern else (p for p in folder.iterdir() if p.suffix[1:].lower() in RECORDINGS)
     # Folders alone are left out: a valve of which a recording can't be read is refused, not calibrated on the rest.
+    found = folder.glob(pattern) if pattern else recordings_in(folder)
     return sorted(str(path) for path in found if not path.is_dir() and not path.name.startswith("."))
 
 

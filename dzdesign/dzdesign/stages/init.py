@@ -14,7 +14,14 @@ from dzdesign.core.display import strict_templates
 from dzdesign.core.errors import InputError, one_line
 from dzdesign.core.options import AnyPath, Option, Paths, Table, paths_of, read_options
 from dzdesign.core.recorded_units import AS_COMPUTED
-from dzdesign.stages.recordings import ColumnArguments, distinct_names, expand, read_recordings, refuse_copies
+from dzdesign.stages.recordings import (
+    ColumnArguments,
+    distinct_names,
+    expand,
+    read_recordings,
+    recordings_in,
+    refuse_copies,
+)
 from dzdesign.terminal.progress import say, stage_progress, with_bar
 
 if TYPE_CHECKING:
@@ -23,8 +30,6 @@ if TYPE_CHECKING:
     from dzdesign.identify.valve.model import ValveModel
 
 
-#: Endings of the files that are looked for if none are named.
-ENDINGS = ("csv", "csv.gz", "txt", "tdms", "mat", "h5", "hdf5", "parquet", "feather")
 #: Full commands that amplifiers have, V: the smallest that the recordings do not exceed by 2 % is proposed.
 USUAL_U_MAX = (1.0, 2.5, 3.3, 5.0, 10.0, 12.0, 15.0, 20.0, 24.0, 48.0)
 #: Ramps that end above this share of full command are taken to end there.
@@ -119,8 +124,7 @@ def _negative_drop(valve: "ValveModel | None") -> dict[str, str]:
 def _found_recordings() -> list[Path]:
     """Return the recordings in ./ramps, or in this folder."""
     for folder in (Path("ramps"), Path()):
-        found = sorted({path for ending in ENDINGS for path in folder.glob(f"*.{ending}")})
-        if found:
+        if found := recordings_in(folder):
             say(f"recordings found in {folder if folder.name else 'this folder'}: {len(found)}")
             return found
     raise InputError("there are no recordings in ./ramps or in this folder; name them: dzdesign init RAMP...")

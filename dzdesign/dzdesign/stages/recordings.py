@@ -18,6 +18,18 @@ from dzdesign.terminal.progress import say, with_bar
 if TYPE_CHECKING:
     from dzdesign.identify.reading.ramp_test import RampTest
 
+#: What recordings are called where none are named; notes and photographs may lie beside them.
+SUFFIXES = ("csv", "txt", "tsv", "dat", "gz", "tdms", "mat", "h5", "hdf5", "parquet", "feather", "arrow")
+
+
+def recordings_in(folder: Path) -> list[Path]:
+    """Return what lies in a folder and is called as recordings are; a folder alone is none."""
+    there = folder.iterdir() if folder.is_dir() else ()
+    return sorted(
+        path for path in there
+        if path.suffix[1:].lower() in SUFFIXES and not path.is_dir() and not path.name.startswith(".")
+    )  # fmt: skip
+
 
 def read_sample_rate(text: str, option: str) -> float:
     """Read --sample-rate, Hz."""

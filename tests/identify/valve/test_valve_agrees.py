@@ -96,10 +96,18 @@ class TestProof:
         states[0]["multipliers"][3] = ""
         assert "proof" in refused(self.edited(smooth, states=states))
 
-    def test_every_node_has_multipliers_and_none_is_negative(self, proof):
-        for pairs in proof["states"][0]["multipliers"]:
-            values = [float(pair.partition(":")[2]) for pair in pairs.split()]
-            assert values and min(values) > 0
+    @pytest.mark.parametrize("edit", [lambda text: text.replace(":0.", ":0.0"), lambda _: "9999:1", lambda _: "0:-1"])
+    def test_a_multiplier_that_is_edited_proves_nothing(self, smooth, proof, edit):
+        """They are what is read: no solver finds them anew."""
+        states = deepcopy(proof["states"])
+        states[0]["multipliers"] = [edit(each) for each in states[0]["multipliers"]]
+        said = refused(self.edited(smooth, states=states))
+        assert "proof" in said or "multipliers" in said
+
+    @pytest.mark.parametrize("edit", [{"roof": None}, {"unlike_knot": 1000}])
+    def test_a_proof_of_another_shape_is_refused(self, smooth, edit):
+        """Seeded: an IndexError and a ZeroDivisionError."""
+        assert "not those of its ramps" in refused(self.edited(smooth, **edit))
 
     def test_a_state_that_is_missing_is_refused(self, smooth, proof):
         states = [proof["states"][0] | {"multipliers": proof["states"][0]["multipliers"][1:]}]

@@ -159,7 +159,7 @@ def largest_offsets(curves: CurveClass, data: DataSet) -> Proof:
 def prove(curves: CurveClass, data: DataSet, rows: Sequence[np.ndarray]) -> Proof:
     """Return the offset that some rows of what is known prove at each grid point, with exact multipliers.
 
-    They are those of `known_rows`. What A'l lacks of e(p), of rounding, counts with what thresholds differ by.
+    They are those of `known_rows`.
 
     Raises
     ------
@@ -168,29 +168,47 @@ def prove(curves: CurveClass, data: DataSet, rows: Sequence[np.ndarray]) -> Proo
     """
     from scipy.optimize import nnls
 
-    left, right, base = _from_common_zero(curves, data)
-    # No threshold of the class lies further from the common zero than this.
-    highest = data.roof if np.isfinite(data.roof).all() else data.floor
-    largest = 2 * float(highest.max() - data.floor.min())
-    offsets, kept, multipliers = np.empty(len(rows)), [], []
-    for at, of_point in enumerate(rows):
-        point = np.zeros(left.shape[1])
-        point[at] = 1.0
+    left, _, _ = _from_common_zero(curves, data)
+    kept, multipliers = [], []
+    for point, of_point in zip(np.eye(len(rows)), rows, strict=True):
         found = np.zeros(of_point.size)
         if of_point.size:
             with suppress(RuntimeError):  # of many equal rows it may go round: then they prove nothing, which is said
                 found = nnls(left[of_point].T, point, maxiter=ROUNDS * of_point.size)[0]
-        found = np.where(found > SMALLEST, found, 0.0)  # else the rows that are named would follow from rounding
+        used = found > SMALLEST  # else the rows that are named would follow from rounding
+        kept.append(of_point[used])
+        multipliers.append(found[used])
+    return Proof(
+        state=data.state, direction=curves.direction, offsets=proved_offsets(curves, data, kept, multipliers),
+        rows=tuple(kept), multipliers=tuple(multipliers),
+    )  # fmt: skip
+
+
+def proved_offsets(
+    curves: CurveClass, data: DataSet, rows: Sequence[np.ndarray], multipliers: Sequence[np.ndarray]
+) -> np.ndarray:
+    """Return the offset that multipliers of some rows prove at each grid point, V: sums, and no solver.
+
+    What A'l lacks of e(p), of rounding, counts with what thresholds differ by.
+
+    Raises
+    ------
+    InputError
+        If a multiplier is below zero, or they prove nothing.
+    """
+    left, right, base = _from_common_zero(curves, data)
+    # No threshold of the class lies further from the common zero than this.
+    highest = data.roof if np.isfinite(data.roof).all() else data.floor
+    largest = 2 * float(highest.max() - data.floor.min())
+    offsets = np.empty(len(rows))
+    for at, (of_point, found) in enumerate(zip(rows, multipliers, strict=True)):
+        point = np.zeros(left.shape[1])
+        point[at] = 1.0
         left_over = float(np.sum(np.abs(found @ left[of_point] - point)))
-        if left_over > PROOF:
+        if not left_over <= PROOF or np.any(found < 0):
             raise InputError(f"the multipliers of a certified bound miss their proof by {left_over:.1g}")
         offsets[at] = base + float(right[of_point] @ found) / 1e3 - left_over * largest
-        kept.append(of_point[found > 0])
-        multipliers.append(found[found > 0])
-    return Proof(
-        state=data.state, direction=curves.direction, offsets=offsets, rows=tuple(kept),
-        multipliers=tuple(multipliers),
-    )  # fmt: skip
+    return offsets
 
 
 def _from_common_zero(curves: CurveClass, data: DataSet) -> tuple[np.ndarray, np.ndarray, float]:

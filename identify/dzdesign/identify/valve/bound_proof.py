@@ -13,7 +13,7 @@ import numpy as np
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError, quantity
-from dzdesign.identify.fit.certificate import Certificate, Criticals, data_sets, prove
+from dzdesign.identify.fit.certificate import Certificate, Criticals, data_sets, proved_offsets
 from dzdesign.identify.fit.curve_class import CurveClass, Kind, find_class, one_way
 from dzdesign.identify.fit.ramp_model import Ramps, fit_ramp_model
 from dzdesign.identify.fit.scatter import Origin, Scatter, describe_scatter, unlike_at
@@ -22,7 +22,7 @@ from dzdesign.identify.valve.quantity_types import PressureDrop, SecondDifferenc
 #: What a bound of the file may lie above its proof by, V: its last digit, and those of the critical values.
 ROUNDING_V = 1e-6
 #: Pairs of a row and its multiplier.
-Multipliers = Annotated[str, Meta(max_length=4096, pattern=r"^(\d{1,4}:[0-9.e+-]{1,24}( |$))*$")]
+Multipliers = Annotated[str, Meta(max_length=4096, pattern=r"^(\d{1,4}:\d{1,9}(\.\d{1,17})?(e[-+]?\d{1,2})?( |$))*$")]
 Deviations = Annotated[float, quantity("1", ge=0, le=1e9)]
 
 
@@ -66,10 +66,11 @@ class StateProof:
     """Rows that matter at each node, and the multiplier of each, such as 3:0.25 17:0.75. Rows count from 0: those of
     the class from below, from above, floors, then roofs."""
 
-    def rows(self) -> list[np.ndarray]:
-        """Return the rows that matter at each node."""
-        pairs = [each.split() for each in self.multipliers]
-        return [np.array([int(pair.partition(":")[0]) for pair in each], dtype=int) for each in pairs]
+    def rows_and_multipliers(self) -> tuple[list[np.ndarray], list[np.ndarray]]:
+        """Return the rows that matter at each node, and their multipliers."""
+        pairs = [[pair.split(":") for pair in each.split()] for each in self.multipliers]
+        rows = [np.array([row for row, _ in each], dtype=int) for each in pairs]
+        return rows, [np.array([value for _, value in each], dtype=float) for each in pairs]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -146,8 +147,8 @@ class BoundProof:
             raise RuleError("the proofs of a bound are not those of the states and nodes that follow from its ramps")
         proved = []
         for each in self.states:
-            of_state = prove(classes[each.direction], data[each.state], each.rows())
-            proved.append(classes[each.direction].under_chords(of_state.offsets))
+            offsets = proved_offsets(classes[each.direction], data[each.state], *each.rows_and_multipliers())
+            proved.append(classes[each.direction].under_chords(offsets))
         return curves.grid_MPa, np.min(proved, axis=0)
 
     def check(self, dp_MPa: Sequence[float], bound_V: Sequence[float]) -> None:

@@ -140,16 +140,23 @@ def _full(
 
 
 def _promised(ramp: PressureResult, curves: Mapping[str, Curves], compensator: Compensator) -> float:
-    """Return the share of the largest flow that the law leaves: all of it, but for one that corrects no gain.
+    """Return the share of the largest flow that the law leaves: of `paper` all of it.
 
-    That loses (1 - beta) u_min0 / (u_max - beta u_min0), statement T2e; the drives at zero command stand for both.
+    `target`, which corrects no gain, loses (1 - beta) u_min0 / (u_max - beta u_min0), statement T2e; the drives at zero
+    command stand for both. Of a law of the user's it is what was recorded at its own output at full command.
     """
+    u_max_V = float(compensator.u_max_V)
     if compensator.law == "paper":
         return 1.0
-    at_zero = curves[zero_command_name(ramp.side)]
-    drive = at_zero["drive_V"] / float(compensator.u_max_V)
-    here = float(np.interp(ramp.dp_MPa, at_zero["dp_MPa"], drive))
-    return 1 - (float(drive.max()) - here) / (1 - here)
+    if compensator.law == "target":
+        at_zero = curves[zero_command_name(ramp.side)]
+        drive = at_zero["drive_V"] / u_max_V
+        here = float(np.interp(ramp.dp_MPa, at_zero["dp_MPa"], drive))
+        return 1 - (float(drive.max()) - here) / (1 - here)
+    test = _test_of(ramp, compensator)
+    full = corners_of(compensator, compensator.signals.code_at(test.dp_MPa), SIGNS[ramp.side]).full
+    flow: float = test.recorded.opening.flow_at(np.array([full * u_max_V]))[0] / test.recorded.q_max_L_min
+    return flow
 
 
 def _test_of(ramp: PressureResult, compensator: Compensator) -> TestResult:
