@@ -128,9 +128,8 @@ def input_checks(inputs: InputCheck, units: RecordedUnits, *, both_signs: bool) 
         (
             requirements.PRESSURE_DIFFERENCE,
             inputs.odd_pairs,
-            f"{inputs.odd_pairs} of {inputs.pressure_pairs} pairs of pressure codes differ (the commands of each "
-            "difference use its pairs in turn; zero command uses all pairs that the law follows or that lie outside "
-            "the sensors' valid range)",
+            f"{inputs.odd_pairs} of {inputs.pressure_pairs} pairs of pressure codes differ (all at zero command; other "
+            "commands take those of a difference in turn)",
         ),
         (
             requirements.FALLBACK,
