@@ -83,7 +83,7 @@ def _rows_of(name: str, bench: Bench, outcomes: Outcomes, limit: float) -> Itera
         what=f"{name}: sd of the law's beta(5 MPa)",
         value=float(outcomes.law_beta_last.std()),
         limit=limit_here,
-        note="the certified offset's ratio: held under the staircase of lower bounds, not at the knees",
+        note="the certified offset's ratio: held under the certified bound, not at the knees",
     )
     spread = float(outcomes.beta_last.std())
     claimed = np.sqrt(np.mean(outcomes.beta_last_se**2))

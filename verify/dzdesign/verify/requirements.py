@@ -127,17 +127,17 @@ FMU_DRIVE = Requirement(
 )
 FMU_UNITS = Requirement(id="fmu-units", title="inputs in V and MPa give the exact law of their codes")
 FMU_CLOSED_LOOP = Requirement(id="fmu-closed-loop", title="the coupled FMUs behave as the closed loop")
-#: Of amplifiers: `export` checks a file before it writes it, `verify` that of a folder.
-READ_BACK = Requirement(id="amplifier-read-back", title="the file is read back", how="`export`, `verify`")
+#: Of an amplifier's file.
+READ_BACK = Requirement(id="amplifier-read-back", title="the file is read back", how="`verify` of an amplifier's file")
 SAFE = Requirement(
     id="amplifier-over-compensation",
     title="no over-compensation at zero command in the tested pressure range",
-    how="`export`, `verify`",
+    how="`verify` of an amplifier's file",
 )
 DEAD_ZONES = Requirement(
     id="amplifier-dead-zones",
     title="the stated dead zones are those of the file's law",
-    how="`export`, `verify`",
+    how="`verify` of an amplifier's file",
 )
 OWN_PLANT = Requirement(
     id="own-plant", title="the closed-loop requirements hold with the machine's plant", how="`verify --plant`"

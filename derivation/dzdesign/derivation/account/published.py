@@ -56,9 +56,8 @@ LARGEST_CODE, PIN_V, COUNTS_PER_PIN_VOLT = _printed("4095", "3"), _printed("3", 
 PWM_KHZ, PWM_AMPLITUDE_V = _printed("2.5", "3"), _printed("3.16", "3")
 #: Commands from which the first valve's curves with compensator are flat, V.
 SATURATED_FROM_V = (_printed("8", "4.2"), _printed("8.5", "4.2"))
-#: Pressure drop and commands of the tests with load and oil temperature.
+#: Pressure drop of the tests with load and oil temperature.
 LOAD_DP_MPA = int(_printed("3", "4.3"))
-LOAD_COMMANDS_V = (_printed("1.5", "4.3"), _printed("3.5", "4.3"))
 #: Change of the dead zone with the oil's temperature, over 1000; which temperatures, the text leaves open.
 TEMPERATURE_CHANGE_PER_MILLE = _printed("2", "4.3")
 

@@ -1,4 +1,4 @@
-"""One style for all plots: of `identify --plots`, of `assess --plots` and of the report."""
+"""One style for all plots: of `identify --plots` and of the report."""
 
 import os
 import sys

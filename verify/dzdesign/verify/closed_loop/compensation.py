@@ -12,9 +12,9 @@ from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs_at_tests import corners_of, remaining_dead_zone
 from dzdesign.design.redesign import hysteresis_left
 from dzdesign.design.signals import SIDE_NAMES
-from dzdesign.identify.valve.ramp_result import TestResult
 from dzdesign.identify.valve.side_model import SideModel
 from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN
+from dzdesign.verify.closed_loop.loop_checks import nearest_test
 from dzdesign.verify.closed_loop.ramps import Curves, zero_command_name
 from dzdesign.verify.closed_loop.scene import SIGNS
 from dzdesign.verify.loop_results import PressureResult
@@ -81,7 +81,7 @@ def _dead_zone(ramps: Sequence[PressureResult], compensator: Compensator) -> Ite
     """Say by how much the dead zone on opening is longer than stated, or than the law makes it with this plant."""
     found = []
     for ramp in ramps:
-        sign, test = SIGNS[ramp.side], _test_of(ramp, compensator)
+        sign, test = SIGNS[ramp.side], nearest_test(ramp, compensator.valve)
         corners = corners_of(compensator, compensator.signals.code_at(test.dp_MPa), sign)
         own = max(corners.command_at(ramp.dead_zone_opening), corners.leaves)
         stated = max(remaining_dead_zone(compensator, test, sign).get("opening", 0.0), own)
@@ -97,7 +97,7 @@ def _hysteresis(ramps: Sequence[PressureResult], compensator: Compensator) -> It
     """Say by how much the compensated branches lie further apart than stated, where both were recorded."""
     found = []
     for ramp in ramps:
-        stated = hysteresis_left(compensator, _test_of(ramp, compensator), SIGNS[ramp.side])
+        stated = hysteresis_left(compensator, nearest_test(ramp, compensator.valve), SIGNS[ramp.side])
         if stated.size:
             found.append((abs(ramp.hysteresis) - float(np.mean(np.abs(stated))), ramp))
     if found:
@@ -147,12 +147,7 @@ def _promised(ramp: PressureResult, curves: Mapping[str, Curves], compensator: C
         drive = at_zero["drive_V"] / u_max_V
         here = float(np.interp(ramp.dp_MPa, at_zero["dp_MPa"], drive))
         return 1 - (float(drive.max()) - here) / (1 - here)
-    test = _test_of(ramp, compensator)
+    test = nearest_test(ramp, compensator.valve)
     full = corners_of(compensator, compensator.signals.code_at(test.dp_MPa), SIGNS[ramp.side]).full
     flow: float = test.recorded.opening.flow_at(np.array([full * u_max_V]))[0] / test.recorded.q_max_L_min
     return flow
-
-
-def _test_of(ramp: PressureResult, compensator: Compensator) -> TestResult:
-    tests = compensator.valve.sides[ramp.side].tests
-    return min(tests, key=lambda test: abs((test.dp_MPa or 0.0) - ramp.dp_MPa))

@@ -72,13 +72,13 @@ def plant_is_the_valve(ramps: Sequence[PressureResult], valve: ValveModel) -> Ch
     """Tell whether the plant opens, and closes, where the ramp tests say that the valve does."""
 
     def later_V(ramp: PressureResult, share: float, knee_V: float | None) -> float:
-        return share * valve.u_max_V - (_test_of(ramp, valve).u_guard_V if knee_V is None else knee_V)
+        return share * valve.u_max_V - (nearest_test(ramp, valve).u_guard_V if knee_V is None else knee_V)
 
     def opens_V(ramp: PressureResult) -> float:
-        return later_V(ramp, ramp.dead_zone_opening, _test_of(ramp, valve).u_knee_rising_V)
+        return later_V(ramp, ramp.dead_zone_opening, nearest_test(ramp, valve).u_knee_rising_V)
 
     def closes_V(ramp: PressureResult) -> float:
-        return later_V(ramp, ramp.dead_zone_closing, _test_of(ramp, valve).u_knee_falling_V)
+        return later_V(ramp, ramp.dead_zone_closing, nearest_test(ramp, valve).u_knee_falling_V)
 
     worst = max(ramps, key=lambda ramp: abs(opens_V(ramp)))
     early = max(ramps, key=closes_V)  # shut where the valve still passes flow
@@ -103,7 +103,7 @@ def stand_in_is_the_recording(ramps: Sequence[PressureResult], valve: ValveModel
         units = valve.recorded_units
         volts = units.of_side(moved.side).text(moved_V, ".2f dV")
         text = (
-            f"the recorded flow of '{_test_of(moved, valve).source}' {what} {volts} further from its threshold (at "
+            f"the recorded flow of '{nearest_test(moved, valve).source}' {what} {volts} further from its threshold (at "
             f"{_at(moved, units)}) than {SAME_CURVE:.0%} of full command and {KNEE_ERRORS:g} standard errors. So this "
             "plant does not represent the valve, perhaps because of many outliers: record it again, or give a plant "
             "(--plant)"
@@ -113,7 +113,7 @@ def stand_in_is_the_recording(ramps: Sequence[PressureResult], valve: ValveModel
     text = f"{_miss(worst, valve)}; expected {SAME_FLOW:.0%} at most"
     if not holds:
         text += (
-            f". Look at '{_test_of(worst, valve).source}' there (identify --plots) for a drop-out or spikes of the "
+            f". Look at '{nearest_test(worst, valve).source}' there (identify --plots) for a drop-out or spikes of the "
             "flow. Leave those rows out, or record the ramp again, and identify again"
         )
     return PLANT_IS_THE_VALVE.check(holds=holds, text=text)
@@ -121,7 +121,7 @@ def stand_in_is_the_recording(ramps: Sequence[PressureResult], valve: ValveModel
 
 def _moved(ramp: PressureResult, valve: ValveModel) -> Iterator[tuple[float, str, PressureResult]]:
     """Give by how much a stand-in opens and closes beyond what it may beside its test's onset and knee, V."""
-    test = _test_of(ramp, valve)
+    test = nearest_test(ramp, valve)
     for what, share, onset_V, knee_V, se_V in (
         ("opens", ramp.dead_zone_opening, test.u_onset_rising_V, test.u_knee_rising_V, test.u_knee_rising_se_V),
         ("closes", ramp.dead_zone_closing, test.u_onset_falling_V, test.u_knee_falling_V, test.u_knee_falling_se_V),
@@ -131,7 +131,7 @@ def _moved(ramp: PressureResult, valve: ValveModel) -> Iterator[tuple[float, str
         yield (max(min(ends_V) - at_V, at_V - max(ends_V)) - allowed_V if ends_V else 0.0), what, ramp
 
 
-def _test_of(ramp: PressureResult, valve: ValveModel) -> TestResult:
+def nearest_test(ramp: PressureResult, valve: ValveModel) -> TestResult:
     """Return the ramp test nearest to that pressure drop."""
     return min(valve.sides[ramp.side].tests, key=lambda test: abs((test.dp_MPa or 0.0) - ramp.dp_MPa))
 

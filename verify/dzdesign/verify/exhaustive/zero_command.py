@@ -125,7 +125,7 @@ def _extreme(values: np.ndarray, first: np.ndarray, last: np.ndarray, extreme: n
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ZeroCommandMargin:
-    """What the drive at zero command leaves to one staircase of bounds: where it is least, and how often too little."""
+    """What the drive at zero command leaves to one valve's bounds: where it is least, and how often too little."""
 
     #: Negative if the bound is exceeded.
     margin_V: Fraction
