@@ -56,7 +56,7 @@ def _offset(curves: Mapping[str, Curves], compensator: Compensator, sign: int) -
         certified_V = np.interp(np.maximum(dp_MPa, side.reference.dp_MPa), dp_MPa, certified_V)
     taken_V = np.zeros(dp_MPa.size)
     if law.budget is not None:  # the bound has the recording's part in it, and the drive a dither's peak
-        counted = [line for line in map(law.budget.line, ("recording", "dither")) if line]
+        counted = [line for line in (law.budget.line("recording"), law.budget.line("dither")) if line]
         others_mV = np.array(law.budget.combined_mV) - np.sum([line.contribution_mV for line in counted], axis=0)
         taken_V = np.interp(dp_MPa, law.budget.dp_MPa, 1e-3 * others_mV)
     below_V = certified_V - taken_V - at_zero["drive_V"]
