@@ -124,5 +124,5 @@ def board_lines(template: str) -> tuple[str, ...]:
     """
     return (
         f"Written by dzdesign {__version__} from template {template}. Yours to edit: `dzdesign codegen` keeps what",
-        "you change here, and `dzdesign verify` names this file as yours and does not check it.",
+        "you change here, and `dzdesign verify` names this file as yours.",
     )

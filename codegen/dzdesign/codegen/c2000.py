@@ -1,11 +1,11 @@
 """What both C2000 targets have alike: files, integers for registers, limits, and the times about a PWM period."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
 from dzdesign.codegen.target import FlashSector, Target
 from dzdesign.codegen.telemetry.frame import Link
-from dzdesign.core.errors import DzdesignError
+from dzdesign.core.errors import DzdesignError, InputError, nearest
 from dzdesign.design.current.circuit import CurrentSampling
 from dzdesign.design.target_inputs import Converter
 
@@ -15,6 +15,10 @@ ISR_DELAY_S = Fraction(20, 10**6)  # from the start of conversion to the interru
 SAMPLE_TIMEOUT_S = Fraction(32, 10**4)  # four sample periods
 WATCHDOG_COUNTS = 512 * 256  # clock / 512 into eight bits, no further divider
 ADC_BITS, CHANNELS = 12, 3
+#: Conversions of each sequence that are not used: TI reports a first code of FFFh, which would be full drive.
+DISCARDED = 1
+#: What the converter reads, and the channel of each where none is declared.
+ROLES = {"command": "A0", "pressure_a": "A1", "pressure_b": "A2", "current": "A3", "supply": "A4"}
 #: With current control: as many codes in a period as there are results beside those of the sample. The interrupt comes
 #: so late that all but one of them are of this period, and its value acts from the next one on.
 CURRENT = CurrentSampling(tick_Hz=PWM_HZ, samples=8, before=7)
@@ -24,8 +28,10 @@ CURRENT_READ_S = Fraction(10, 10**6)  # that the interrupt may take to read the 
 #: of the projectspec.
 TOOLS = {"cgt_version": "22.6.3.LTS", "c2000ware_default": "C:/ti/c2000/C2000Ware_26_01_00_00"}
 #: The C of every project whose template is its own, the rest of it, and what builds it, which both targets share.
-OF_THE_DEVICE = ("main.c", "dz_hardware.c", "dz_hardware.h")
-OF_BOTH = ("dz_isr.c", "dz_isr.h", "dzdesign.projectspec", "Makefile")
+OF_THE_DEVICE = ("main.c", "dz_hardware.c", "dz_hardware.h", "dz_board.h")
+OF_BOTH = ("dz_isr.c", "dz_isr.h", "dz_user.h", "dzdesign.projectspec", "Makefile")
+#: The user's code, called by main(); beside it, in the same folder, may lie more of it.
+USER_CODE = "board/dz_user.c"
 
 
 def c2000_target(
@@ -34,6 +40,9 @@ def c2000_target(
     context: Mapping[str, str],
     *,
     converter: Converter,
+    known_channels: Sequence[str],
+    channels: Sequence[str] = (),
+    crystal_hz: int | None = None,
     sources: tuple[str, ...] = (),
     block_sources: tuple[str, ...] = (),
     sector: FlashSector,
@@ -41,9 +50,10 @@ def c2000_target(
 ) -> Target:
     """Return the target whose figures, printed, are `context`.
 
-    `sources` is the C that only it has, `block_sources` what it has besides in block form.
+    `sources` is the C that only it has, `block_sources` what it has besides in block form. For `channels` and
+    `crystal_hz` see `Target.on_board`; the numbers of channels are their places in `known_channels`.
     """
-    own = (*OF_THE_DEVICE, *OF_BOTH[:2], *sources)
+    own = (*OF_THE_DEVICE, *OF_BOTH[:3], *sources)
     templates = {file: f"{file}.jinja" for file in (*own, "README.md")}
     templates |= {file: f"c2000/{file}.jinja" for file in OF_BOTH}
     listed = {
@@ -58,13 +68,29 @@ def c2000_target(
         sample_Hz=SAMPLE_HZ,
         tick_Hz=PWM_HZ,
         current_sampling=CURRENT,
-        templates={f"{name}/{file}": template for file, template in templates.items()},
+        templates={f"{name}/{file}": template for file, template in templates.items()}
+        | {USER_CODE: "c2000/dz_user.c.jinja"},
         block_templates={f"{name}/{file}": f"{file}.jinja" for file in block_sources},
-        board=frozenset({f"{name}/dzdesign.projectspec"}),  # where the user's C2000Ware lies
-        context={**context, **TOOLS, **listed},
+        # Where the user's C2000Ware lies, what is wired to the device, and what else it does.
+        board=frozenset({f"{name}/dzdesign.projectspec", f"{name}/dz_board.h", USER_CODE}),
+        context={**context, **TOOLS, **listed, **_channels(name, known_channels, channels)},
+        crystal_Hz=crystal_hz,
+        channels=tuple(channels),
         sector=sector,
         link=link,
     )
+
+
+def _channels(name: str, known: Sequence[str], declared: Sequence[str]) -> dict[str, str]:
+    """Return name and number of the channel of each role, printed; of those that are not declared one that is free."""
+    for channel in declared:
+        if channel not in known:
+            hint = nearest(channel, known)
+            raise InputError(f"--channels: {name} has no channel '{channel}'{hint}; it has {known[0]} to {known[-1]}")
+    free = [channel for channel in (*ROLES.values(), *known) if channel not in declared]
+    of_roles = dict(zip(ROLES, (*declared, *(free if declared else ROLES.values())), strict=False))
+    names = {f"{role}_channel": f"ADCIN{channel}" for role, channel in of_roles.items()}
+    return names | {f"{role}_number": str(known.index(channel)) for role, channel in of_roles.items()}
 
 
 def exact(quantity: Fraction, what: str, largest: int) -> int:

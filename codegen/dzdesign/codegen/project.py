@@ -33,7 +33,7 @@ from dzdesign.core.errors import DzdesignError, InputError, nearest
 from dzdesign.design.certificate import reach_of_certificate
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import BLOCK_FILE, VECTORS_NAME, Calibration, FirmwareManifest, FirmwareOrigin
-from dzdesign.design.target_inputs import Converter
+from dzdesign.design.target_inputs import Converter, TargetInputs
 
 if TYPE_CHECKING:
     import jinja2
@@ -82,6 +82,11 @@ def target_named(name: str) -> Target:
     return target
 
 
+def target_for(designed_for: TargetInputs) -> Target:
+    """Return the target that a compensator was designed for, on the board that was declared."""
+    return target_named(designed_for.name).on_board(designed_for.crystal_Hz, designed_for.channels)
+
+
 def targets() -> tuple[Target, ...]:
     """Return every target, in the order of the names."""
     return tuple(target_named(name) for name in TARGET_NAMES)
@@ -115,7 +120,9 @@ def generate(
     designed_for = compensator.target
     target = target_named(target_name or (designed_for.name if designed_for else DEFAULT_TARGET))
     if designed_for:
-        target_named(designed_for.name).check_designed_for(designed_for)
+        of_design = target_for(designed_for)
+        of_design.check_designed_for(designed_for)
+        target = of_design if of_design.name == target.name else target
     target.check_signals(compensator.signals)
     note = target.check_designed_for(designed_for) if designed_for else ""
     document = to_json_bytes(compensator)

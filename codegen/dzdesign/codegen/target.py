@@ -1,8 +1,8 @@
 """What a target folder hands to the renderer: one flat, frozen plan of printed strings."""
 
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import PurePosixPath
 from types import MappingProxyType
 
@@ -71,6 +71,11 @@ class Target:
     sector: FlashSector | None = None
     #: The serial line of its telemetry, if it sends any.
     link: Link | None = None
+    #: Declared of the board: its crystal, and the converter's channels in the order of `c2000.ROLES`.
+    crystal_Hz: int | None = None
+    channels: tuple[str, ...] = ()
+    #: What makes this target on a declared board; None where a board has nothing that these files would know.
+    of_board: Callable[[int | None, Sequence[str]], "Target"] | None = None
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", self.name):
@@ -105,6 +110,26 @@ class Target:
         """Where a calibration block lies; address 0, in octets, where it has no sector of its own."""
         return self.sector.place if self.sector else Place()
 
+    def on_board(self, crystal_Hz: int | None, channels: Sequence[str]) -> "Target":
+        """Return the target on a board with this crystal and these channels; without any the target as it is.
+
+        Raises
+        ------
+        InputError
+            If the target's files know of no board, or can't work on this one.
+        """
+        if crystal_Hz is None and not channels:
+            return self
+        if self.of_board is None:
+            given = "--crystal" if crystal_Hz else "--channels"
+            raise InputError(f"{given} is of a board of TI's C2000, and target {self.name} has none; leave it out")
+        try:
+            return replace(self.of_board(crystal_Hz, channels), of_board=self.of_board)
+        except InputError:
+            raise
+        except DzdesignError as error:
+            raise InputError(f"--crystal: {self.name} can't be clocked by it: {error}") from error
+
     def inputs(self) -> TargetInputs:
         """Return the converter and timer that a compensator for this target is designed for."""
         return TargetInputs(
@@ -114,6 +139,8 @@ class Target:
             sample_Hz=self.sample_Hz,
             tick_Hz=self.tick_Hz,
             current_sampling=self.current_sampling,
+            crystal_Hz=self.crystal_Hz,
+            channels=self.channels,
         )
 
     def check_current_control(self, sampling: CurrentSampling) -> None:

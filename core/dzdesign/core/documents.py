@@ -87,9 +87,7 @@ def open_bytes(path: Path, what: str) -> Iterator[BinaryIO]:
             if _stamp(file) == before:
                 raise
         if _stamp(file) != before:
-            raise InputError(
-                f"{what} '{path}' was changed while it was read; wait until it is written, then try again"
-            )
+            raise InputError(f"{what} '{path}' was changed while it was read; wait until it is written, then try again")
 
 
 def _opened(path: Path, what: str) -> BinaryIO:
@@ -261,9 +259,7 @@ def written_by(schema: str) -> str | None:
     return WRITTEN_BY.get(family_of(schema))
 
 
-def read_toml(
-    content: bytes, source: str, expected: str, parse_float: Callable[[str], Any] = float
-) -> dict[str, Any]:
+def read_toml(content: bytes, source: str, expected: str, parse_float: Callable[[str], Any] = float) -> dict[str, Any]:
     """Return the content of a TOML file in UTF-8; what is none, or too large, is an `InputError`.
 
     `source` names the file, `expected` says what was expected in it, for the message.

@@ -33,8 +33,8 @@ Table = str | Mapping[str, str] | None
 #: Headings of the help, in their order; an option without one stands above them.
 RECORDINGS, METER, FIT, LAW = "recordings", "flow meter", "fit", "law"
 CONNECTIONS, DRIVE, CHECKS = "connections of the firmware", "drive functions", "further checks"
-MACHINE, OUTPUTS = "machine", "outputs other than a C firmware"
-GROUPS = (RECORDINGS, METER, FIT, LAW, CONNECTIONS, DRIVE, MACHINE, OUTPUTS, CHECKS)
+MACHINE, BOARD, OUTPUTS = "machine", "board", "outputs other than a C firmware"
+GROUPS = (RECORDINGS, METER, FIT, LAW, CONNECTIONS, DRIVE, MACHINE, BOARD, OUTPUTS, CHECKS)
 
 
 @dataclass(frozen=True, slots=True)

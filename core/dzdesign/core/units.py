@@ -19,7 +19,7 @@ _QUANTITIES = {
     "pressure": ("Pa", "MPa, bar, kPa, psi"),
     "flow": ("m**3/s", "L/min, Lmin, m3/s, gpm"),
     "length": ("m", "mm, m, in"),
-    "frequency": ("Hz", "Hz, kHz"),
+    "frequency": ("Hz", "Hz, kHz, MHz"),
     "ratio": ("", "%"),
     "current": ("A", "mA, A"),
     "resistance": ("ohm", "ohm, kohm"),

@@ -43,9 +43,7 @@ def current_request(text: Mapping[str, str], read: Mapping[str, Any], target: Ta
             raise InputError(f"{useless[0]} is for --drive current, but --drive is duty; give --drive current")
         return None
     if target.current_sampling is None:
-        raise InputError(
-            f"the files of target {target.name} sample no current; give --drive duty, or another --target"
-        )
+        raise InputError(f"the files of target {target.name} sample no current; give --drive duty, or another --target")
     if missing := [flag_of(name) for name in NEEDED if not text[name]]:
         raise InputError(
             f"--drive current needs {', '.join(missing)}; write for example --coil '3.5 ohm 40 mH' --rated-current "

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal, get_args
 
 from dzdesign.core.errors import InputError, quoted
 from dzdesign.core.option_readers import quantity, quantity_range, with_tolerance
-from dzdesign.core.options import CONNECTIONS, DRIVE, LAW, MACHINE, Option, Text, arguments_of
+from dzdesign.core.options import BOARD, CONNECTIONS, DRIVE, LAW, MACHINE, Option, Text, arguments_of
 from dzdesign.core.units import parse_quantity
 from dzdesign.derivation.laws import LAW_NAMES
 from dzdesign.identify.constants import L_MIN
@@ -45,6 +45,8 @@ DEGREES = r"[-+]?\d{1,6}(?:\.\d{0,9})?"
 TEMPERATURES = re.compile(
     rf"\s*(?P<low>{DEGREES})\s*(?:(?:\.\.|to)\s*(?P<high>{DEGREES})\s*)?(?P<unit>(?:deg|°)?\s?[CF])\s*", re.ASCII
 )
+CHANNEL = re.compile(r"[A-D]\d{1,2}", re.ASCII)
+MOST_HZ = 150e6
 CODES = re.compile(r"\s*(\d{1,4})\s*\+\s*(\d{1,4})\s*\+\s*(\d{1,4})\s*codes?\s*", re.ASCII)
 
 
@@ -120,6 +122,25 @@ def _converter_errors(text: str, option: str) -> tuple[int, ...]:
     return tuple(map(int, found.groups()))
 
 
+def _crystal(text: str, option: str) -> int:
+    """Read the frequency of a crystal, Hz: a whole number."""
+    hertz = parse_quantity(text, "frequency", option)
+    if not 0 < hertz <= MOST_HZ or round(hertz) != round(hertz, 3):
+        raise InputError(f"{option} is {quoted(text)}, expected a frequency up to 150 MHz, such as '30 MHz'")
+    return round(hertz)
+
+
+def _channels(text: str, option: str) -> tuple[str, ...]:
+    """Read the names of the converter's channels: of command, pressure A and pressure B, then of current and supply."""
+    names = tuple(text.upper().replace(",", " ").split())
+    if not 3 <= len(names) <= 5 or len(set(names)) < len(names) or not all(map(CHANNEL.fullmatch, names)):
+        raise InputError(
+            f"{option} is {quoted(text)}, expected the channels of command, pressure A and pressure B (then of the "
+            "current and the supply, where they are read), each once, such as 'A0 A1 A2'"
+        )
+    return names
+
+
 def _coil(text: str, option: str) -> dict[str, Any]:
     """Read a coil as arguments of `CoilCircuit`."""
     coil = COIL.fullmatch(text.strip())
@@ -184,9 +205,9 @@ class DesignChoices:
     pressure, such as "0.1 %" or "0.02 MPa", or "0.1 % / 0.5 %" for A and B."""
     bench_pressure_error: Annotated[Text, Option("E", MACHINE, example="0.02 MPa")] = None
     """Error of the recorded pressure drop, as a pressure or as a share of the span (default: two sensors of 0.1 %)."""
-    pressure_converter: Annotated[
-        Text, Option("E", MACHINE, example="15 + 30 + 4 codes", read=_converter_errors)
-    ] = None
+    pressure_converter: Annotated[Text, Option("E", MACHINE, example="15 + 30 + 4 codes", read=_converter_errors)] = (
+        None
+    )
     """Offset, gain error at the top of the range and peak noise of the converter on each pressure channel, such as
     "15 + 30 + 4 codes" (default: the target's data sheet)."""
     oil: Annotated[Text, Option("E", MACHINE, example="0.2 %", read=read_error)] = None
@@ -212,9 +233,9 @@ class DesignChoices:
     reading_flow: Annotated[Text, Option("Q", LAW, example="0.6 L/min", read=_reading_flow)] = None
     """Flow at which dead zones are read, in addition to the onset (default: the meter's floor, or the noise level of a
     meter without one)."""
-    output_max: Annotated[
-        Text, Option("C", LAW, "100 %", example="95 %", read=share(Fraction(1), or_zero=False))
-    ] = None
+    output_max: Annotated[Text, Option("C", LAW, "100 %", example="95 %", read=share(Fraction(1), or_zero=False))] = (
+        None
+    )
     """Largest drive, in percent of full drive."""
     accept: Annotated[Text, Option("CODE", LAW)] = None
     """Warnings to accept, separated by commas (default: none, the design is refused). branch-order: the valve seems to
@@ -225,9 +246,9 @@ class DesignChoices:
     ohm = -10..10 V"."""
     polarity: Annotated[Text, Option("P", CONNECTIONS, "normal", choices=POLARITIES)] = None
     """Polarity of the command. normal: more signal is more command. inverted: more signal is less command."""
-    pressure_span: Annotated[
-        Text, Option("P", CONNECTIONS, "20 MPa", example="20 MPa", read=quantity("pressure"))
-    ] = None
+    pressure_span: Annotated[Text, Option("P", CONNECTIONS, "20 MPa", example="20 MPa", read=quantity("pressure"))] = (
+        None
+    )
     """Span of both pressure sensors."""
     pressure_a: Annotated[Text, Option("S", CONNECTIONS, example="4..20 mA on 140 ohm")] = None
     """Signal of the sensor upstream of the metering edge, such as "4..20 mA on 140 ohm = 25 MPa". The default is 4..20
@@ -238,6 +259,12 @@ class DesignChoices:
     """Pressure drop at negative commands, of the two pressure inputs. recorded: as the recordings show it, and same if
     they do not. same: A minus B, as at positive commands. swapped: B minus A. wired: the machine switches the inputs,
     so that A minus B is the metering drop at both signs."""
+    crystal: Annotated[Text, Option("F", BOARD, example="30 MHz", read=_crystal)] = None
+    """Frequency of the board's crystal or oscillator, for target f28335 (default: 30 MHz). Processor and PWM get the
+    fastest clock that it allows. Target f280049c takes the clock of TI's device.h."""
+    channels: Annotated[Text, Option("C", BOARD, example="A0 A1 A2", read=_channels)] = None
+    """Channels of the converter for command, pressure A and pressure B, of the targets f28335 and f280049c (default:
+    "A0 A1 A2"). With --drive current those of the current and of a measured supply follow (default: "A3 A4")."""
     ramp_up: Annotated[Text, Option("T", DRIVE, "0 s", example="0.5 s", read=_times)] = None
     """Time from zero to full command, such as "0.5 s", or "0.5 s / 0.8 s" for positive and negative commands."""
     ramp_down: Annotated[Text, Option("T", DRIVE, "0 s", example="0.5 s", read=_times)] = None

@@ -199,8 +199,7 @@ def _side(batch: Mapping[str, Compensator], first: Compensator, sign: int) -> _S
     models = {name: each.valve.sides[SIDE_NAMES[sign]] for name, each in batch.items()}
     guard = first.side(sign).certificate.guard
     curves = {
-        name: guarded_curve(model, guard, first.below_dp0, first.above, first.machine)
-        for name, model in models.items()
+        name: guarded_curve(model, guard, first.below_dp0, first.above, first.machine) for name, model in models.items()
     }
     low, high = _common_interval([curves])
     doubles, least = [], list[ExactRow]()

@@ -193,9 +193,7 @@ class Allowance:
 
     def _with(self, counts: Callable[[Component], bool]) -> "Allowance":
         parts = (self.pressures_MPa, self.factors, self.shares)
-        pressures, factors, shares = (
-            {name: value for name, value in part.items() if counts(name)} for part in parts
-        )
+        pressures, factors, shares = ({name: value for name, value in part.items() if counts(name)} for part in parts)
         return replace(
             self,
             pressures_MPa=pressures,
@@ -228,9 +226,7 @@ def allowance_of(
         "pressure converter gain": machine.pressure_gain_codes * per_code,
         "pressure converter noise": machine.pressure_noise_codes * per_code,
     }
-    return Allowance(
-        signals=signals, sign=sign, pressures_MPa=pressures, factors=machine.least_factors, shares=shares
-    )
+    return Allowance(signals=signals, sign=sign, pressures_MPa=pressures, factors=machine.least_factors, shares=shares)
 
 
 def dither_reserve(

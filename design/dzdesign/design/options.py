@@ -226,6 +226,10 @@ def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
     if text["hysteresis"] == "play" and read["transition"] == 0:
         raise InputError("--hysteresis play begins in the transition, but --transition is off; leave out one")
     current = current_request(text, read, target)
+    if (channels := read["channels"]) and len(channels) != (
+        expected := 3 + bool(current) + bool(text["supply_signal"])
+    ):
+        raise InputError(f"--channels names {len(channels)} channels, expected {expected} of these inputs")
     return DesignOptions(
         **{name: read[name] for name in ("law", "negative_dp", "guard", "below_dp0", "above", "transition")},
         signals=signals,
@@ -276,7 +280,5 @@ def _dither(text: str) -> tuple[float, Fraction]:
     if not (frequency_Hz and peak):
         raise InputError("a dither needs both, a frequency and a peak, such as '150 Hz 1 %'")
     if not LOWEST_HZ <= frequency_Hz <= HIGHEST_HZ:
-        raise InputError(
-            f"the dither's frequency is {frequency_Hz:g} Hz, expected {LOWEST_HZ:g} to {HIGHEST_HZ:g} Hz"
-        )
+        raise InputError(f"the dither's frequency is {frequency_Hz:g} Hz, expected {LOWEST_HZ:g} to {HIGHEST_HZ:g} Hz")
     return frequency_Hz, peak

@@ -162,9 +162,7 @@ def hysteresis_choices(compensator: Compensator) -> tuple[HysteresisChoice, ...]
     for other in found[1:]:
         if other.left < best.left - WORTH:
             best = other
-    return tuple(
-        replace(each, recommended=each is best and each.onset is not None) for each in found
-    )
+    return tuple(replace(each, recommended=each is best and each.onset is not None) for each in found)
 
 
 def _judged(given: str, made: Compensator) -> HysteresisChoice:

@@ -17,13 +17,13 @@ from dzdesign.command_line.parser import (
 )
 from dzdesign.core.documents import read_bytes, read_toml
 from dzdesign.core.errors import InputError, nearest, quoted
-from dzdesign.core.options import MACHINE, Argument, arguments_of, flag_of
+from dzdesign.core.options import BOARD, MACHINE, Argument, arguments_of, flag_of
 from dzdesign.terminal.progress import say
 
 #: Characters of a key to which the nearest known one is looked for.
 LONGEST_KEY = 80
 #: Groups of options that stand in a table of their own.
-TABLES = (MACHINE,)
+TABLES = (MACHINE, BOARD)
 #: The table of any names, for people.
 RECORD = "record"
 #: Entries of it that `init` proposes, though other commands have options of these names.

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from dzdesign.core.artefact_files import check_file_may_be_written, write_file
 from dzdesign.core.documents import read_bytes, sha256_of
 from dzdesign.core.errors import InputError
-from dzdesign.core.options import AnyPath, Option, flag_of
+from dzdesign.core.options import AnyPath, Option, flag_of, read_options
 from dzdesign.design.design_choices import DEFAULTS, DesignChoices
 
 if TYPE_CHECKING:
@@ -44,7 +44,9 @@ def design_options(choices: DesignChoices, target: str) -> "DesignOptions":
     from dzdesign.codegen.project import target_named
     from dzdesign.design.options import options_of
 
-    options = options_of({name: getattr(choices, name) or "" for name in DEFAULTS}, target_named(target).inputs())
+    board = read_options(choices, ["crystal", "channels"])
+    inputs = target_named(target).on_board(board["crystal"], board["channels"] or ()).inputs()
+    options = options_of({name: getattr(choices, name) or "" for name in DEFAULTS}, inputs)
     if options.signals.command.negative_full_code is not None:
         return options
     useless = [flag_of(name) for name in OF_BOTH_SIGNS if getattr(choices, name) not in (None, DEFAULTS[name])]

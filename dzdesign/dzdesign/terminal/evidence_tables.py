@@ -1,6 +1,5 @@
 """A verification, an assessment and a reproduction as tables on stdout."""
 
-
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -20,6 +19,7 @@ if TYPE_CHECKING:
     from dzdesign.verify.loop_results import ScenarioResult
     from dzdesign.verify.outputs.verification import OutputVerification
     from dzdesign.verify.verification import Verification
+
 
 def print_result(verification: "Verification | OutputVerification") -> None:
     """Print a verification of a C firmware, or of another output."""

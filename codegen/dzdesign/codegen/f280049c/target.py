@@ -4,11 +4,15 @@ Functions and clocks: DriverLib of C2000Ware for the F28004x (epwm.h, adc.h, sys
 converter: data sheet SPRS945.
 """
 
+from collections.abc import Sequence
+from dataclasses import replace
 from fractions import Fraction
+from math import ceil
 
 from dzdesign.codegen.c2000 import (
     ADC_BITS,
     CHANNELS,
+    DISCARDED,
     ISR_DELAY_S,
     c2000_target,
     current_timing,
@@ -17,7 +21,8 @@ from dzdesign.codegen.c2000 import (
     pwm_timing,
     within,
 )
-from dzdesign.codegen.target import FlashSector
+from dzdesign.codegen.target import FlashSector, Target
+from dzdesign.core.errors import InputError
 from dzdesign.design.target_inputs import Converter, peak_noise_codes
 
 SYSCLK_HZ = 100_000_000  # DEVICE_SYSCLK_FREQ of device.h: 20 MHz crystal, times 10, over 2
@@ -28,6 +33,8 @@ WINDOW_SYSCLKS, WINDOW_MAX_SYSCLKS = 50, 512  # ADC_setupSOC()
 WINDOW_LEAST_S = Fraction(75, 10**9)
 CONVERSION_ADCCLKS = 12  # one more than the 10.5 of 12 bits, rounded up
 WATCHDOG_HZ = 10_000_000  # INTOSC1
+CHANNEL_NAMES = [f"A{number}" for number in range(16)]  # ADC_CH_ADCINn of ADC A
+PWM_MODULES = 8
 ADC_SPAN_V = Fraction(33, 10)
 # SPRS945G, table of the ADC's characteristics: largest offset error; largest gain error with the internal reference,
 # which dz_hardware.c takes; SNR with SYSCLK from X1, which device.h takes.
@@ -49,20 +56,25 @@ def converter() -> dict[str, str]:
     exact(Fraction(WINDOW_SYSCLKS), "SYSCLK cycles of the sample window", WINDOW_MAX_SYSCLKS)
     window_s = Fraction(WINDOW_SYSCLKS, SYSCLK_HZ)
     within(window_s, max(WINDOW_LEAST_S, 1 / adcclk_hz), 1, "the sample window in s")
-    sequence_s = CHANNELS * (window_s + CONVERSION_ADCCLKS / adcclk_hz)
-    within(sequence_s, 0, ISR_DELAY_S / 2, "the three conversions in s")
-    of_four_s = sequence_s * (CHANNELS + 1) / CHANNELS
-    current = current_timing(SYSCLK_HZ, window_s, window_s + CONVERSION_ADCCLKS / adcclk_hz)
-    within(of_four_s, 0, Fraction(current["current_start"]) / SYSCLK_HZ, "the four conversions in s")
+    conversion_s = window_s + CONVERSION_ADCCLKS / adcclk_hz
+    sequence_s = within((DISCARDED + CHANNELS) * conversion_s, 0, ISR_DELAY_S / 2, "the conversions in s")
+    with_supply_s = sequence_s + conversion_s
+    current = current_timing(SYSCLK_HZ, window_s, conversion_s)
+    within(with_supply_s, 0, Fraction(current["current_start"]) / SYSCLK_HZ, "the conversions with the supply in s")
+    # A board's window: of the data sheet, and as long as the conversions may take.
+    longest_s = ISR_DELAY_S / 2 / (DISCARDED + CHANNELS + 1) - CONVERSION_ADCCLKS / adcclk_hz
     return {
         "adc_divider": f"{ADC_DIVIDER}_0",
         "adcclk_mhz": printed(adcclk_hz / 10**6),
         "window_sysclks": str(WINDOW_SYSCLKS),
         "window_us": printed(window_s * 10**6),
         "sequence_us": printed(sequence_s * 10**6),
-        "sequence_of_four_us": printed(of_four_s * 10**6),
+        "sequence_with_supply_us": printed(with_supply_s * 10**6),
+        "window_least": str(ceil(max(WINDOW_LEAST_S, 1 / adcclk_hz) * SYSCLK_HZ)),
+        "window_most": str(int(longest_s * SYSCLK_HZ)),
+        "pwm_modules": str(PWM_MODULES),
         **current,
-        "held_us": printed(window_s * 10**6),
+        "current_held_us": printed(window_s * 10**6),
         "current_timeout_ticks": "2",  # a flag comes with the last of eight codes
         "adc_codes": str(2**ADC_BITS),
         "adc_code_max": str(2**ADC_BITS - 1),
@@ -94,19 +106,29 @@ PROJECT = {
     "ti_debug_target": f"{WARE}/targetConfigs/TMS320F280049C.ccxml",
 }
 
-TARGET = c2000_target(
-    "f280049c",
-    "TI TMS320F280049C at 100 MHz: DriverLib, ePWM1 at 2.5 kHz, ADC at 1.25 kHz, CCS project and makefile",
-    {**timing(), **converter(), **PROJECT},
-    converter=Converter(
-        full_V=ADC_SPAN_V,
-        levels=2**ADC_BITS,
-        offset_codes=OFFSET_CODES,
-        gain_codes=GAIN_CODES,
-        noise_codes=peak_noise_codes(SNR_DB, 2**ADC_BITS),
-    ),
-    # Of bank 1, which can be erased while the firmware runs from bank 0.
-    sector=FlashSector(
-        region="FLASH_BANK1_SEC8", page=0, file="28004x_generic_flash_lnk.cmd", address=0x09_8000, words=0x1000
-    ),
-)
+
+def on_board(crystal_hz: int | None = None, channels: Sequence[str] = ()) -> Target:
+    """Return the target on a declared board, see `Target.on_board`."""
+    if crystal_hz:
+        raise InputError("--crystal is for target f28335: the clock of f280049c is that of TI's device.h; leave it out")
+    return c2000_target(
+        "f280049c",
+        "TI TMS320F280049C at 100 MHz: DriverLib, ePWM1 at 2.5 kHz, ADC at 1.25 kHz, CCS project and makefile",
+        {**timing(), **converter(), **PROJECT},
+        known_channels=CHANNEL_NAMES,
+        channels=channels,
+        converter=Converter(
+            full_V=ADC_SPAN_V,
+            levels=2**ADC_BITS,
+            offset_codes=OFFSET_CODES,
+            gain_codes=GAIN_CODES,
+            noise_codes=peak_noise_codes(SNR_DB, 2**ADC_BITS),
+        ),
+        # Of bank 1, which can be erased while the firmware runs from bank 0.
+        sector=FlashSector(
+            region="FLASH_BANK1_SEC8", page=0, file="28004x_generic_flash_lnk.cmd", address=0x09_8000, words=0x1000
+        ),
+    )
+
+
+TARGET = replace(on_board(), of_board=on_board)

@@ -1,13 +1,18 @@
 """The numbers of the F28335 project, derived once from engineering quantities and checked here.
 
-Register fields and limits: SPRUI07 (technical reference manual of the TMS320x2833x), data sheet SPRS439.
+All follow from the board's crystal. Register fields and limits: SPRUI07 (technical reference manual of the
+TMS320x2833x), data sheet SPRS439.
 """
 
+from collections.abc import Sequence
+from dataclasses import replace
 from fractions import Fraction
+from math import ceil
 
 from dzdesign.codegen.c2000 import (
     ADC_BITS,
     CHANNELS,
+    DISCARDED,
     ISR_DELAY_S,
     PWM_HZ,
     SAMPLE_HZ,
@@ -20,19 +25,21 @@ from dzdesign.codegen.c2000 import (
 )
 from dzdesign.codegen.calibration.layout import NO_INTERLOCK
 from dzdesign.codegen.loading.protocol import LOAD_S
-from dzdesign.codegen.target import FlashSector
+from dzdesign.codegen.target import FlashSector, Target
 from dzdesign.codegen.telemetry.frame import BITS_PER_OCTET, CRC_OCTETS, FRAME_BITS, FRAME_OCTETS, Link, frame_context
 from dzdesign.design.drive_functions import RAMP_UNIT
 from dzdesign.design.target_inputs import Converter
 
-CRYSTAL_HZ = 30_000_000
-PLL_DIV, PLL_DIVSEL = 10, 2  # SYSCLKOUT = crystal * DIV / DIVSEL, as C2000Ware's InitSysCtrl() sets it
+CRYSTAL_HZ = 30_000_000  # where no other is declared
+CRYSTAL_LEAST_HZ, CRYSTAL_MOST_HZ = 4_000_000, 150_000_000  # of an oscillator at X1
+PLL_DIV_MAX, PLL_DIVSEL = 10, 2  # SYSCLKOUT = crystal * DIV / DIVSEL
 SYSCLKOUT_MAX_HZ = 150_000_000
-HISPCP, ADCCLKPS, ACQ_PS = 3, 1, 15
+ADCCLKPS, ACQ_PS = 1, 15
 ADCCLK_MAX_HZ = 25_000_000
 # SPRS439, sequential sampling mode: from the trigger to the sample window, and to the first result after it; ADCCLKs.
 ADC_TRIGGER_ADCCLKS, ADC_RESULT_ADCCLKS = Fraction(5, 2), 4
 ADC_SPAN_V = 3
+CHANNEL_NAMES = [f"{half}{number}" for half in "AB" for number in range(8)]  # in the order of CONVnn of ADCCHSELSEQn
 LOSPCP, LSPCLK_MAX_HZ = 1, 75_000_000
 LINK = Link(tick_Hz=PWM_HZ, frame_ticks=25, baud=115_200)  # section 4.1 of the paper records at 100 Hz
 FIFO_OCTETS = 16
@@ -48,6 +55,7 @@ CHECK_INSTRUCTIONS = 35_500
 FLASH_CYCLES, CHECK_CYCLES = 6, 8
 #: WDFLAG: crystal periods from a falling XRS to the look at it, and those for which a watchdog reset holds it low.
 WDFLAG_PERIODS, WDRST_PERIODS = 4 * 8192 + 512, 512
+PWM_MODULES = 6
 EVENT_PRESCALE = {1: "ET_1ST", 2: "ET_2ND", 3: "ET_3RD"}
 
 
@@ -62,43 +70,64 @@ def in_us(time_s: Fraction) -> str:
     return f"{float(time_s * 10**6):.3f}".rstrip("0").rstrip(".")
 
 
-def timing() -> dict[str, str]:
+def pll_div(crystal_hz: int) -> int:
+    """Return the PLL's factor that makes the fastest clock that the device bears.
+
+    Examples
+    --------
+    >>> pll_div(30_000_000), pll_div(20_000_000), pll_div(50_000_000)
+    (10, 10, 6)
+    """
+    return min(SYSCLKOUT_MAX_HZ * PLL_DIVSEL // crystal_hz, PLL_DIV_MAX)
+
+
+def sysclkout(crystal_hz: int) -> Fraction:
+    """Return the clock of processor and ePWM, Hz."""
+    within(Fraction(crystal_hz), CRYSTAL_LEAST_HZ, CRYSTAL_MOST_HZ, "the crystal in Hz")
+    return Fraction(crystal_hz * pll_div(crystal_hz), PLL_DIVSEL)
+
+
+def timing(crystal_hz: int) -> dict[str, str]:
     """Clock, PWM, interrupt and time-out figures."""
-    sysclkout_hz = within(Fraction(CRYSTAL_HZ * PLL_DIV, PLL_DIVSEL), 1, SYSCLKOUT_MAX_HZ, "SYSCLKOUT in Hz")
-    figures = pwm_timing(sysclkout_hz, CRYSTAL_HZ, max(EVENT_PRESCALE))
+    sysclkout_hz = sysclkout(crystal_hz)
+    figures = pwm_timing(sysclkout_hz, crystal_hz, max(EVENT_PRESCALE))
     rest_s = Fraction(1, PWM_HZ) - ISR_DELAY_S
     return {
         **figures,
         "clock_mhz": printed(sysclkout_hz / 10**6),
+        "sysclk_hz": str(exact(sysclkout_hz, "SYSCLKOUT in Hz", SYSCLKOUT_MAX_HZ)),
         "check_instructions": str(CHECK_INSTRUCTIONS),
         "check_cycles": str(CHECK_CYCLES),
         "flash_cycles": str(FLASH_CYCLES),
         "check_ms": f"{float(1000 * CHECK_INSTRUCTIONS * CHECK_CYCLES / sysclkout_hz):.2f}",
         "wdflag_cycles": str(WDFLAG_PERIODS),
-        "wdflag_ms": f"{1e3 * WDFLAG_PERIODS / CRYSTAL_HZ:.2f}",
-        "wdrst_us": f"{1e6 * WDRST_PERIODS / CRYSTAL_HZ:.0f}",
-        "crystal_mhz": printed(Fraction(CRYSTAL_HZ, 10**6)),
-        "pll_div": str(PLL_DIV),
+        "wdflag_ms": f"{1e3 * WDFLAG_PERIODS / crystal_hz:.2f}",
+        "wdrst_us": f"{1e6 * WDRST_PERIODS / crystal_hz:.0f}",
+        "crystal_hz": str(crystal_hz),
+        "crystal_mhz": printed(Fraction(crystal_hz, 10**6)),
+        "pll_div": str(pll_div(crystal_hz)),
         "pll_divsel": str(PLL_DIVSEL),
+        "pwm_modules": str(PWM_MODULES),
         "isr_rest_us": printed(rest_s * 10**6),
         "isr_rest_cycles": printed(rest_s * sysclkout_hz),
         "soca_prescale": EVENT_PRESCALE[int(figures["ticks_per_sample"])],
     }
 
 
-def converter() -> dict[str, str]:
+def converter(sysclkout_hz: Fraction) -> dict[str, str]:
     """Clock and window of the converter; the sequence must be over well before the interrupt."""
-    sysclkout_hz = Fraction(CRYSTAL_HZ * PLL_DIV, PLL_DIVSEL)
-    hspclk_hz = within(sysclkout_hz / (2 * HISPCP), 1, ADCCLK_MAX_HZ, "HSPCLK in Hz")
+    hispcp = ceil(sysclkout_hz / (2 * ADCCLK_MAX_HZ))
+    hspclk_hz = within(sysclkout_hz / (2 * hispcp), 1, ADCCLK_MAX_HZ, "HSPCLK in Hz")
     adcclk_hz = within(hspclk_hz / (2 * ADCCLKPS), 1, ADCCLK_MAX_HZ, "ADCCLK in Hz")
     next_channel = ACQ_PS + 2
-    held_s = (ADC_TRIGGER_ADCCLKS + ACQ_PS + 1) / adcclk_hz  # the first channel, the command: end of its window
-    results = ADC_RESULT_ADCCLKS + (CHANNELS - 1) * next_channel
-    sequence_s = within(held_s + results / adcclk_hz, 0, ISR_DELAY_S / 2, "the sequence of three, in s,")
-    of_four_s = sequence_s + next_channel / adcclk_hz
-    current = current_timing(sysclkout_hz, held_s, held_s + ADC_RESULT_ADCCLKS / adcclk_hz)
+    first_s = (ADC_TRIGGER_ADCCLKS + ACQ_PS + 1) / adcclk_hz  # end of the window of the first conversion
+    held_s = first_s + DISCARDED * next_channel / adcclk_hz  # of the command's, which follows those not used
+    results = ADC_RESULT_ADCCLKS + (DISCARDED + CHANNELS - 1) * next_channel
+    sequence_s = within(first_s + results / adcclk_hz, 0, ISR_DELAY_S / 2, "the sample's sequence in s")
+    with_supply_s = sequence_s + next_channel / adcclk_hz
+    current = current_timing(sysclkout_hz, first_s, first_s + ADC_RESULT_ADCCLKS / adcclk_hz)
     # The sequence of the sample must be over before the first conversion of the current starts.
-    within(of_four_s, 0, Fraction(current["current_start"]) / sysclkout_hz, "the sequence of four, in s,")
+    within(with_supply_s, 0, Fraction(current["current_start"]) / sysclkout_hz, "the sequence with the supply in s")
     period_s = Fraction(1, PWM_HZ)
     # The value is written before the period ends and loaded at its end; the latest falling edge is one count before
     # the next end. Between two samples the value is used once more.
@@ -106,7 +135,7 @@ def converter() -> dict[str, str]:
     to_edge_s = to_period_s + period_s - 1 / sysclkout_hz
     held_periods = Fraction(PWM_HZ, SAMPLE_HZ)
     return {
-        "hispcp": str(HISPCP),
+        "hispcp": str(hispcp),
         "adcclkps": str(ADCCLKPS),
         "acq_ps": str(ACQ_PS),
         "hspclk_mhz": printed(hspclk_hz / 10**6),
@@ -117,7 +146,8 @@ def converter() -> dict[str, str]:
         "delay_to_period_us": in_us(to_period_s),
         "delay_to_edge_us": in_us(to_edge_s),
         "delay_to_last_edge_us": in_us(to_edge_s + (held_periods - 1) * period_s),
-        "sequence_of_four_us": printed(of_four_s * 10**6),
+        "sequence_with_supply_us": printed(with_supply_s * 10**6),
+        "current_held_us": in_us(first_s),
         **current,
         "current_timeout_ticks": "1",  # a sequencer tells of each code
         "adc_codes": str(2**ADC_BITS),
@@ -127,9 +157,8 @@ def converter() -> dict[str, str]:
     }
 
 
-def serial_line() -> dict[str, str]:
-    """Clock and rate of SCI-A, and what the frames cost."""
-    sysclkout_hz = Fraction(CRYSTAL_HZ * PLL_DIV, PLL_DIVSEL)
+def serial_line(sysclkout_hz: Fraction) -> dict[str, str]:
+    """Clock and rate of the serial line, and what the frames cost."""
     lspclk_hz = within(sysclkout_hz / (2 * LOSPCP), 1, LSPCLK_MAX_HZ, "LSPCLK in Hz")
     brr = exact(Fraction(round(lspclk_hz / (8 * LINK.baud)) - 1), "the baud register", 0xFFFF)
     baud = lspclk_hz / (8 * (brr + 1))
@@ -193,13 +222,24 @@ PROJECT = {
     "ti_debug_target": f"{WARE}/common/targetConfigs/TMS320F28335.ccxml",
 }
 
-TARGET = c2000_target(
-    "f28335",
-    "TI TMS320F28335 at 150 MHz: ePWM1 at 2.5 kHz, ADC at 1.25 kHz, CCS project and makefile",
-    {**timing(), **converter(), **serial_line(), **frame_context(), **PROJECT},
-    converter=Converter(full_V=Fraction(ADC_SPAN_V), levels=2**ADC_BITS),
-    sources=("dz_telemetry.c", "dz_telemetry.h", "dz_frame.c", "dz_frame.h"),
-    block_sources=("dz_active.c", "dz_active.h"),
-    sector=FlashSector(region="FLASHB", page=1, file="F28335.cmd", address=0x33_0000, words=0x8000),
-    link=LINK,
-)
+
+def on_board(declared_hz: int | None = None, channels: Sequence[str] = ()) -> Target:
+    """Return the target on a declared board, see `Target.on_board`."""
+    crystal_hz = declared_hz or CRYSTAL_HZ
+    figures = {**timing(crystal_hz), **converter(sysclkout(crystal_hz)), **serial_line(sysclkout(crystal_hz))}
+    return c2000_target(
+        "f28335",
+        "TI TMS320F28335 at 150 MHz: ePWM1 at 2.5 kHz, ADC at 1.25 kHz, CCS project and makefile",
+        {**figures, **frame_context(), **PROJECT},
+        converter=Converter(full_V=Fraction(ADC_SPAN_V), levels=2**ADC_BITS),
+        known_channels=CHANNEL_NAMES,
+        channels=channels,
+        crystal_hz=declared_hz,
+        sources=("dz_telemetry.c", "dz_telemetry.h", "dz_frame.c", "dz_frame.h"),
+        block_sources=("dz_active.c", "dz_active.h"),
+        sector=FlashSector(region="FLASHB", page=1, file="F28335.cmd", address=0x33_0000, words=0x8000),
+        link=LINK,
+    )
+
+
+TARGET = replace(on_board(), of_board=on_board)

@@ -207,9 +207,7 @@ def _variable(model: Model, variable: Variable) -> str:
             of_kind["displayUnit"] = displayed[0]
     if variable.range is not None:
         of_kind |= dict(zip(("min", "max"), map(int, variable.range), strict=True))
-    return _element(
-        "ScalarVariable", common, [_element(variable.kind.capitalize(), {**of_kind, **_start(variable)})]
-    )
+    return _element("ScalarVariable", common, [_element(variable.kind.capitalize(), {**of_kind, **_start(variable)})])
 
 
 def _structure(model: Model) -> str:
@@ -220,6 +218,4 @@ def _structure(model: Model) -> str:
     entries = [_element("Unknown", {"index": places[name], "dependencies": text}) for name, text in follows.items()]
     # At initialization parameters are known as inputs are: an output may follow them all.
     unknown = [_element("Unknown", {"index": places[name]}) for name in follows]
-    return _element(
-        "ModelStructure", {}, [_element("Outputs", {}, entries), _element("InitialUnknowns", {}, unknown)]
-    )
+    return _element("ModelStructure", {}, [_element("Outputs", {}, entries), _element("InitialUnknowns", {}, unknown)])

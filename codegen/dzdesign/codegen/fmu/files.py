@@ -82,9 +82,7 @@ PLATFORMS = (
 )  # fmt: skip
 
 
-def output_files(
-    compensator: Compensator, origin: FirmwareOrigin, settings: Mapping[str, str]
-) -> Mapping[str, bytes]:
+def output_files(compensator: Compensator, origin: FirmwareOrigin, settings: Mapping[str, str]) -> Mapping[str, bytes]:
     """Return the FMUs, name to bytes: of the compensator, and of the plant in the settings, as JSON, if there is one.
 
     The same input, ziglang and FMPy give the same bytes. Without these two, or for a plant behind a current controller,

@@ -78,9 +78,7 @@ class _Table:
         """Add a variable."""
         reference = 1 + len(self.variables)
         self.variables.append(
-            Variable(
-                name=name, reference=reference, description=description, causality=causality, kind=kind, **how
-            )
+            Variable(name=name, reference=reference, description=description, causality=causality, kind=kind, **how)
         )
 
 

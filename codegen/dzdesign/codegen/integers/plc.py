@@ -197,5 +197,3 @@ def _tcpou_xml(text: str) -> bytes:
 def _written(top: Element) -> bytes:
     written: bytes = ElementTree.tostring(top, encoding="utf-8", xml_declaration=True)
     return written + b"\n"
-
-
