@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from dzdesign.verify.verification import Verification
 
 #: Options that make no sense for an output other than a C firmware, unless its kind takes one.
-OF_FIRMWARE = ("blocks", "plant", "back_pressure", "include", "machine_code")
+OF_FIRMWARE = ("blocks", "plant", "back_pressure", "include", "machine_code", "board_code")
 #: No port behind a valve's edge has more.
 LARGEST_BACK_MPA = 100.0
 
@@ -53,6 +53,9 @@ class VerifyArguments:
     beside the tested pressure drops). Ramps run at the highest pressure, and failing sensors at each. Repeatable."""
     include: Annotated[Paths, Option("DIR", CHECKS)] = ()
     """Folder of headers for your board files, such as those of your chip. Repeatable."""
+    board_code: Annotated[bool, Option(group=CHECKS)] = False
+    """Compile and run your own C too, on the model of the device: the files in board/ and the board files that you
+    changed. For targets f28335 and f280049c. Use it for code that you trust."""
     machine_code: Annotated[bool, Option(group=CHECKS)] = False
     """Check machine code too. The Cortex-M4 runs every input in QEMU, and the AVR a sample in simavr."""
 
@@ -141,6 +144,7 @@ def verify_firmware(
                 backs_MPa=_back_pressures_MPa(texts_of(arguments.back_pressure)),
                 include=[Path(place) for place in paths_of(arguments.include)],
                 machine_code=arguments.machine_code,
+                board_code=arguments.board_code,
                 ramps=partial(ramps, stage) if ramps else None,
                 blocks=of_blocks if blocks else None,
             )

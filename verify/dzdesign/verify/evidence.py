@@ -151,9 +151,9 @@ class Evidence(Artefact):
     target: str
     """Microcontroller of the firmware."""
     changed_board_files: Names
-    """Board files that were changed since generation; they are not checked."""
+    """Board files that were changed since generation and that did not run on the model of the device."""
     user_files: Names
-    """Source and project files in the user's folder board/; they are not checked."""
+    """Source and project files in the user's folder board/ that did not run on the model of the device."""
     differing_files: Mapping[str, Sha256]
     """SHA-256, as verified, of every file that differs from the firmware's manifest or is missing from it."""
     board_not_compiled: str

@@ -35,6 +35,19 @@ SOURCES = {
     ".st", ".xml", ".tcpou", ".m", ".p", ".mexa64", ".mexw64", ".mexmaci64", ".mexmaca64", ".fmu",
 }  # fmt: skip
 BUILD_FILES = {"makefile", "gnumakefile", "cmakelists.txt", ".project", ".cproject", ".ccsproject"}
+#: What TI's CCS makes of a project that is built in place, and what our makefile builds in: no code of anybody's.
+CCS_FOLDERS = {
+    "debug",
+    "release",
+    "ram",
+    "flash",
+    ".settings",
+    ".launches",
+    "targetconfigs",
+    "build_ram",
+    "build_flash",
+}
+CCS_FILES = {".project", ".cproject", ".ccsproject"}
 #: Files that a sentence names, and characters of a line that it shows.
 MOST_NAMED, SHOWN = 3, 50
 AGAIN = "make the folder again with `dzdesign codegen`, or write a target for code of your own"
@@ -236,10 +249,13 @@ def _added_fault(folder: Path, generated: Collection[str]) -> str:
 
 
 def added_files(folder: Path, generated: Collection[str]) -> list[str]:
-    """Return the source files that were not generated, but for those in folders that CMake builds in."""
+    """Return the source files that were not generated, but for what CMake and CCS make where they build."""
     ours = {parent for name in generated for parent in (folder / name).parents}
     built = {path.parent for path in folder.rglob("CMakeCache.txt")} - ours
+    with_ccs = any(PurePosixPath(name).suffix == ".projectspec" for name in generated)
+    built |= {path for path in folder.rglob("*") if with_ccs and path.name.casefold() in CCS_FOLDERS} - ours
     found = [path for path in sorted(folder.rglob("*")) if _is_source(path) and not built.intersection(path.parents)]
+    found = [path for path in found if not (with_ccs and path.name.casefold() in CCS_FILES)]
     return [name for name in (path.relative_to(folder).as_posix() for path in found) if name not in generated]
 
 

@@ -103,9 +103,7 @@ PRESSURE_INPUTS = Requirement(
     title="the pressure inputs, wired as recorded, give the recorded pressure drop",
     how="`verify --ramps` with the recordings that valve.json was made from",
 )
-BOARD_FILES = Requirement(
-    id="board-files", title="your board files compile", how=f"{OF_SOME}with board files of yours"
-)
+BOARD_FILES = Requirement(id="board-files", title="your board files compile", how=f"{OF_SOME}with board files of yours")
 #: Of a firmware in block form.
 OWN_BLOCK = Requirement(
     id="block-accepted", title="the firmware accepts its calibration block and refuses damaged ones", how=IN_BLOCK_FORM
@@ -151,18 +149,43 @@ LOAD_STEPS = Requirement(
 CURRENT_STATES = Requirement(
     id="current-controller", title="the current controller equals its exact model", how=BY_CURRENT
 )
-CURRENT_MARGINS = Requirement(
-    id="current-margins", title="the current loop is stable at every corner", how=BY_CURRENT
-)
+CURRENT_MARGINS = Requirement(id="current-margins", title="the current loop is stable at every corner", how=BY_CURRENT)
 CURRENT_SETTLES = Requirement(id="current-settles", title="the current settles at every corner", how=BY_CURRENT)
-CURRENT_STEP = Requirement(
-    id="current-step", title="the current follows a step as fast as stated", how=BY_CURRENT
-)
+CURRENT_STEP = Requirement(id="current-step", title="the current follows a step as fast as stated", how=BY_CURRENT)
 CURRENT_FAULTS = Requirement(
     id="current-faults", title="an open, shorted or over-driven coil switches the output off", how=BY_CURRENT
 )
 CURRENT_VALVE = Requirement(
     id="current-valve", title="the valve opens at the same command with any coil and supply", how=BY_CURRENT
+)
+#: Of a target whose device is modelled: what runs on the model is the firmware, with its hardware files.
+ON_DEVICE = f"{OF_SOME}for a device that is modelled"
+HARDWARE_COMPILES = Requirement(id="hardware-compiles", title="the hardware files compile with the core", how=ON_DEVICE)
+HARDWARE_PWM = Requirement(id="hardware-pwm", title="the PWM pin has its frequency, polarity and duty", how=ON_DEVICE)
+HARDWARE_START = Requirement(
+    id="hardware-start", title="the output is low from reset until the first valid sample", how=ON_DEVICE
+)
+HARDWARE_CHANNELS = Requirement(
+    id="hardware-channels", title="each declared channel reaches its input, and the pin follows the law", how=ON_DEVICE
+)
+HARDWARE_TRIP = Requirement(id="hardware-trip", title="the trip input switches the output off", how=ON_DEVICE)
+HARDWARE_SAMPLE_LOSS = Requirement(id="hardware-sample-loss", title="lost samples switch the output off", how=ON_DEVICE)
+HARDWARE_WATCHDOG = Requirement(
+    id="hardware-watchdog", title="the watchdog resets the device once the interrupt stops", how=ON_DEVICE
+)
+HARDWARE_RATES = Requirement(id="hardware-rates", title="interrupts and samples come at their rates", how=ON_DEVICE)
+HARDWARE_SOLENOIDS = Requirement(
+    id="hardware-solenoids", title="only one of the two solenoids is driven at a time", how=ON_DEVICE
+)
+HARDWARE_CURRENT = Requirement(
+    id="hardware-current", title="the current is sampled on its channel at its times", how=ON_DEVICE
+)
+OF_HARDWARE = (
+    HARDWARE_COMPILES, HARDWARE_PWM, HARDWARE_START, HARDWARE_CHANNELS, HARDWARE_TRIP, HARDWARE_SAMPLE_LOSS,
+    HARDWARE_WATCHDOG, HARDWARE_RATES, HARDWARE_SOLENOIDS, HARDWARE_CURRENT,
+)  # fmt: skip
+BOARD_CODE = Requirement(
+    id="board-code", title="your board code runs on the device's model", how="`verify --board-code`"
 )
 #: What one run tries together: every input, the current loop, the closed loop.
 OF_INPUTS = (EXACT_LAW, MONOTONE, ZERO_COMMAND, ABOVE_TESTS, PRESSURE_DIFFERENCE, FALLBACK)

@@ -12,7 +12,7 @@ from dzdesign.core.artefact_files import MANIFEST_NAME
 from dzdesign.core.artefact_types import THIS_TOOL, Artefact, SourceFile, as_document, schema_of, to_json_bytes
 from dzdesign.core.display import NOT_ASKED_FOR, NOT_CHECKED, ShownInNotebooks
 from dzdesign.core.documents import sha256_of
-from dzdesign.core.errors import RequirementError
+from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.design.pressure_inputs import not_covered
@@ -41,6 +41,9 @@ from dzdesign.verify.folder import (
     reproduced,
     user_files,
 )
+from dzdesign.verify.hardware.board_values import board_of
+from dzdesign.verify.hardware.checks import hardware_checks
+from dzdesign.verify.hardware.model import DEVICES, Bench
 from dzdesign.verify.requirements import EVERY_RUN, OF_SOME, Check, Requirement, Tried, checks_of
 from dzdesign.verify.toolchain.host_compiler import host_compiler
 
@@ -66,6 +69,8 @@ class Asked:
     #: Folders with headers of the user's board files.
     include: Sequence[Path] = ()
     machine_code: bool = False
+    #: The user's own C is compiled and run with the firmware, on the model of its device.
+    board_code: bool = False
     #: With the ramp tests, and with the calibration blocks of other valves.
     ramps: FrontDoor | None = None
     blocks: FrontDoor | None = None
@@ -93,6 +98,8 @@ class Firmware:
     current: CurrentChecks = field(default_factory=CurrentChecks)
     loop: FirmwareLoop = field(default_factory=FirmwareLoop)
     board_not_compiled: str = ""
+    #: Files of the user's that ran on the model of the device.
+    board_ran: tuple[str, ...] = ()
 
     def is_as_generated(self) -> bool:
         """Tell whether more is tried than its text: of a folder that differs nothing else is."""
@@ -119,6 +126,18 @@ def _compiles(firmware: Firmware) -> Iterator[Check]:
     compiles = compiles_strictly(firmware.code, firmware.manifest)
     firmware.scenes = building if compiles.holds else None
     yield compiles
+
+
+def _hardware(firmware: Firmware) -> Iterator[Check]:
+    firmware.say("running the firmware on a model of its device")
+    board = board_of(firmware.folder, firmware.code, firmware.manifest, with_code=firmware.asked.board_code)
+    if board is None:
+        return  # said as what is not tried
+    firmware.board_ran = board.taken
+    if board.code:
+        text = f"{', '.join(board.taken)}: compiled and run with what follows"
+        yield requirements.BOARD_CODE.check(holds=True, text=text)
+    yield from hardware_checks(lambda: Bench(firmware.code, firmware.manifest, firmware.compensator, board))
 
 
 def _every_input(firmware: Firmware) -> list[Check]:
@@ -176,6 +195,11 @@ REQUIREMENTS: tuple[Tried[Firmware], ...] = (
         Firmware.is_as_generated,
     ),
     Tried((requirements.COMPILES,), _compiles, Firmware.is_as_generated),
+    Tried(
+        (*requirements.OF_HARDWARE, requirements.BOARD_CODE),
+        _hardware,
+        lambda each: each.scenes is not None and each.manifest.target in DEVICES,
+    ),
     Tried(requirements.OF_INPUTS, _every_input, lambda each: each.scenes is not None),
     Tried((requirements.LOT,), lambda each: lot_checked(each.inputs, each.compensator), Firmware.runs),
     Tried((requirements.DRIVE,), lambda each: [drive_follows(each.code, each.compensator)], Firmware.runs),
@@ -252,6 +276,11 @@ def verify(
         compensator=read_compensator(folder), asked=asked, say=say, watch=watch,
     )  # fmt: skip
     check_include(asked.include, firmware.manifest)
+    if asked.board_code and firmware.manifest.target not in DEVICES:
+        raise InputError(
+            f"--board-code runs your code on a model of {' or '.join(DEVICES)}, and this firmware is for "
+            f"{firmware.manifest.target}; leave it out"
+        )
     host_compiler()
     checks = checks_of(REQUIREMENTS, firmware)
     manifest = firmware.manifest
@@ -259,8 +288,8 @@ def verify(
         tool=THIS_TOOL,
         made_from=manifest_source(folder),
         target=manifest.target,
-        changed_board_files=changed_board_files(folder, manifest),
-        user_files=user_files(folder, manifest.files),
+        changed_board_files=_not_run(firmware, changed_board_files(folder, manifest)),
+        user_files=_not_run(firmware, user_files(folder, manifest.files)),
         differing_files=differing_files(folder, manifest),
         board_not_compiled=firmware.board_not_compiled,
         checks=checks,
@@ -272,6 +301,10 @@ def verify(
     )
     derived = firmware.compensator if firmware.same and firmware.same.holds else None
     return Verification(evidence=evidence, curves=firmware.curves, loops=firmware.loop.loops, derived=derived)
+
+
+def _not_run(firmware: Firmware, names: Sequence[str]) -> tuple[str, ...]:
+    return tuple(name for name in names if name not in firmware.board_ran)
 
 
 def manifest_source(folder: Path) -> tuple[SourceFile]:
@@ -297,6 +330,7 @@ def evidence_files(verification: Verification) -> dict[str, bytes]:
 
 def untried_requirements(evidence: Evidence) -> tuple[Requirement, ...]:
     """Return what can be checked of a firmware and was not tried, and how to have it tried."""
+    of_the_user = (*evidence.changed_board_files, *evidence.user_files)
     yours = [f"{name}, which is yours and was changed" for name in evidence.changed_board_files]
     yours += [f"{name}, which is yours" for name in evidence.user_files]
     untried = [Requirement(id="user-file", title=title, how=REVIEW) for title in yours]
@@ -308,6 +342,7 @@ def untried_requirements(evidence: Evidence) -> tuple[Requirement, ...]:
         needed.LOAD_STEPS: not any(each.is_load_step for each in evidence.scenarios),
         needed.PRESSURE_INPUTS: len(evidence.inputs) > 1 and needed.PRESSURE_INPUTS.id not in tried,
         needed.CALIBRATION_BLOCK: False,
+        needed.BOARD_CODE: evidence.target in DEVICES and any(name.endswith((".c", ".h")) for name in of_the_user),
     }
     for each in (each for row in REQUIREMENTS for each in row.requirements):
         if lacking.get(each, each.id not in tried and not each.how.startswith(OF_SOME)):

@@ -1,0 +1,1 @@
+"""The files around the core, run on a model of their device: from the converter's channels to the pins."""

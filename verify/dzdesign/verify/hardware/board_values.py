@@ -1,0 +1,73 @@
+"""What of a board is the user's: dz_board.h as numbers, in one strict form; anything else is code of the user's."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from dzdesign.design.firmware_manifest import FirmwareManifest
+from dzdesign.verify.folder import changed_board_files, user_files
+
+BOARD_FILE = "dz_board.h"
+
+COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL)
+VALUE = re.compile(
+    r"\s*#ifndef (DZ_BOARD_\w+)\s*\n\s*#define \1\s+\(?(0[xX][0-9a-fA-F]+|\d+)[uU]?[lL]{0,2}\)?\s*\n\s*#endif", re.ASCII
+)
+WHOLE = re.compile(r"\s*#ifndef DZ_BOARD_H\s*\n\s*#define DZ_BOARD_H\s*\n(.*)#endif\s*", re.ASCII | re.DOTALL)
+
+
+def read_board_values(text: str) -> Mapping[str, int] | None:
+    """Return the values of a board by their names, without DZ_BOARD_; None where more than values stands there.
+
+    Examples
+    --------
+    >>> text = "#ifndef DZ_BOARD_H\\n#define DZ_BOARD_H\\n{}#endif\\n"
+    >>> read_board_values(text.format("#ifndef DZ_BOARD_TZ\\n#define DZ_BOARD_TZ 2u /* TZ2 */\\n#endif\\n"))
+    {'TZ': 2}
+    >>> read_board_values(text.format("int x;\\n")) is None
+    True
+    """
+    plain = COMMENT.sub(" ", text.replace("\r\n", "\n"))
+    whole = WHOLE.fullmatch(plain)
+    if whole is None or VALUE.sub("", whole[1]).strip():
+        return None
+    found = [
+        (name.removeprefix("DZ_BOARD_"), int(number, 0 if "x" in number.lower() else 10))
+        for name, number in VALUE.findall(whole[1])
+    ]
+    return dict(found) if len(dict(found)) == len(found) else None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Board:
+    """The user's part of a firmware, as far as it is compiled and run."""
+
+    values: Mapping[str, int]
+    #: The user's code to compile, by the generated file in whose place it stands.
+    code: Mapping[Path, Path] = field(default_factory=dict)
+    #: Names in the folder of what is taken from it.
+    taken: tuple[str, ...] = ()
+
+
+def board_of(folder: Path, code: Path, manifest: FirmwareManifest, *, with_code: bool) -> Board | None:
+    """Return the board of a firmware folder, its C where that is asked for; None where dz_board.h is more than values.
+
+    What is not taken is that of `code`, as it is generated now.
+    """
+    changed = changed_board_files(folder, manifest)
+    header = f"{manifest.target}/{BOARD_FILE}"
+    values = read_board_values(
+        ((folder if header in changed else code) / header).read_text(encoding="utf-8", errors="replace")
+    )
+    if values is None:
+        return None
+    names = [
+        name
+        for name in (*changed, *user_files(folder, manifest.files))
+        if name != header and name.endswith((".c", ".h"))
+    ]
+    taken = {code / name: folder / name for name in names if with_code}
+    return Board(
+        values=values, code=taken, taken=tuple(name for name in (*changed, *names) if name == header or with_code)
+    )

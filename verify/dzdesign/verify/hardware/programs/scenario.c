@@ -1,0 +1,188 @@
+/* Runs the firmware's main() on the model of its device, and prints what happens outside: a line each, with the counts of
+ * SYSCLKOUT since the clock was set, a word and two numbers.
+ *
+ *   scenario CRYSTAL_HZ WATCHDOG NO_CRYSTAL END_US {TIME_US WORD ONE TWO}...
+ *
+ * What happens from a time on, counted from where interrupts are enabled, or -1 before the start:
+ * code CHANNEL CODE     what a channel converts to             wire GPIO LEVEL     0 low, 1 high, 2 open
+ * converter ON CHANNEL  whether starts of it, or all, are heard  interrupts ON 0     whether the processor takes them
+ * compare A B           written after each interrupt           coil CHANNEL GPIO   a solenoid and its sensor, with
+ * sensor CODES_PER_A ZERO_CODE, winding OHM HENRY, supply V DIODE_V and flows A 0 (at the start)
+ *
+ * Each function of main.c that is entered is a turn of the main loop: it takes TURN_S. */
+#include <setjmp.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "dz_comp.h"
+#include "dz_hardware.h"
+#include "engine.h"
+#include "solenoid.h"
+
+#define TURN_S 37e-6
+
+struct step
+{
+    double at_s;
+    const char *word;
+    double one, two;
+};
+
+int firmware_main(void);
+void __cyg_profile_func_enter(void *function, void *caller);
+void __cyg_profile_func_exit(void *function, void *caller);
+
+static struct step *steps;
+static unsigned step_count, step_at;
+static double started_s, end_s;
+static bool started, writes, interrupts_off, deaf[ALL_CHANNELS + 1u];
+static uint16_t codes[ALL_CHANNELS], compares[2];
+static unsigned coil_channel = ALL_CHANNELS, coil_gpio = GPIOS;
+static struct solenoid solenoid;
+static jmp_buf out;
+
+void happened(const char *what, unsigned one, unsigned two)
+{
+    if ((strcmp(what, "pin") == 0) && (one == coil_gpio))
+    {
+        solenoid_go_to(&solenoid, seconds_now());
+        solenoid.on = two == HIGH;
+    }
+    if (strcmp(what, "start") == 0)
+    {
+        started = true;
+        started_s = seconds_now();
+    }
+    printf("%lld %s %u %u\n", (long long)now, what, one, two);
+}
+
+uint16_t code_at(unsigned channel)
+{
+    if (channel != coil_channel)
+    {
+        return codes[channel];
+    }
+    solenoid_go_to(&solenoid, seconds_now());
+    return solenoid_code(&solenoid);
+}
+
+bool converter_hears(unsigned channel) { return !deaf[channel]; }
+
+bool processor_takes_interrupts(void) { return !interrupts_off; }
+
+void after_interrupt(void)
+{
+    if (writes)
+    {
+        dz_write_compare_a(compares[0]);
+#ifdef TWO_SOLENOIDS
+        dz_write_compare_b(compares[1]);
+#endif
+    }
+}
+
+int64_t next_of_program(void)
+{
+    return ((step_at < step_count) && (started || (steps[step_at].at_s < 0.0))) ? counts_at(started_s + steps[step_at].at_s) : NEVER;
+}
+
+void act(void)
+{
+    const struct step *const step = &steps[step_at];
+    const unsigned one = (unsigned)step->one, two = (unsigned)step->two;
+
+    step_at++;
+    if (strcmp(step->word, "code") == 0)
+    {
+        codes[one] = (uint16_t)two;
+    }
+    else if (strcmp(step->word, "wire") == 0)
+    {
+        outside[one] = (uint8_t)two;
+    }
+    else if (strcmp(step->word, "converter") == 0)
+    {
+        deaf[two] = one == 0u;
+    }
+    else if (strcmp(step->word, "interrupts") == 0)
+    {
+        interrupts_off = one == 0u;
+    }
+    else if (strcmp(step->word, "compare") == 0)
+    {
+        writes = true;
+        compares[0] = (uint16_t)one;
+        compares[1] = (uint16_t)two;
+    }
+    else if (strcmp(step->word, "coil") == 0)
+    {
+        coil_channel = one;
+        coil_gpio = two;
+    }
+    else if (strcmp(step->word, "sensor") == 0)
+    {
+        solenoid.codes_per_A = step->one;
+        solenoid.zero_code = step->two;
+    }
+    else if (strcmp(step->word, "winding") == 0)
+    {
+        solenoid.ohm = step->one;
+        solenoid.henry = step->two;
+    }
+    else if (strcmp(step->word, "supply") == 0)
+    {
+        solenoid.supply_V = step->one;
+        solenoid.diode_V = step->two;
+    }
+    else
+    {
+        solenoid.current = step->one;
+    }
+}
+
+void reset_by_watchdog(void)
+{
+    happened("reset", 0u, 0u);
+    longjmp(out, 1);
+}
+
+void __cyg_profile_func_enter(void *function, void *caller)
+{
+    (void)function, (void)caller;
+    if (started)
+    {
+        delay(TURN_S);
+        if (seconds_now() > started_s + end_s)
+        {
+            happened("end", 0u, 0u);
+            longjmp(out, 1);
+        }
+    }
+}
+
+void __cyg_profile_func_exit(void *function, void *caller) { (void)function, (void)caller; }
+
+int main(int count, char **words)
+{
+    step_count = (unsigned)(count - 5) / 4u;
+    steps = calloc(step_count + 1u, sizeof *steps);
+    for (unsigned each = 0u; each < step_count; each++)
+    {
+        char **const step = words + 5u + 4u * each;
+        steps[each] = (struct step){1e-6 * strtod(step[0], NULL), step[1], strtod(step[2], NULL), strtod(step[3], NULL)};
+    }
+    end_s = 1e-6 * strtod(words[4], NULL);
+    memset(outside, OPEN, sizeof outside);
+    while ((step_at < step_count) && (steps[step_at].at_s < 0.0))
+    {
+        act();
+    }
+    if (setjmp(out) == 0)
+    {
+        power_up(words[2][0] == '1', words[3][0] == '1', strtod(words[1], NULL));
+        settle();
+        (void)firmware_main();
+    }
+    return fflush(stdout);
+}
