@@ -1,8 +1,9 @@
-"""The generated firmware of both C2000 boards on the models of the devices.
+"""The generated firmware of both C2000 boards on the models of the devices that `verify` has, with a core that tells more.
 
 A form of it is compiled once in a session; of a seeded fault only the file that it is in.
 """
 
+import re
 import subprocess
 import tempfile
 from collections.abc import Callable, Mapping
@@ -11,17 +12,20 @@ from pathlib import Path
 
 from dzdesign.codegen.banner import Banner
 from dzdesign.codegen.project import target_files, target_named
+from dzdesign.verify.hardware.model import HERE as MODELS
 from dzdesign.verify.toolchain.host_compiler import STRICT, host_compiler
 from tests.support.current_loops import current_texts
 from tests.support.example_coil import SENSORS, with_current
 from tests.support.golden_firmware import FULL, GOLDENS, golden_compensator
-from tests.support.paths import DEVICES
+from tests.support.paths import TESTS
 
 BOARDS = ("f28335", "f280049c")
 ONE, TWO = "one solenoid", "two solenoids"
 DIGEST = "1234567890abcdef"
-#: What of the model is compiled with the firmware; driver.c includes main.c.
-MODEL = {"f28335": ("device.c", "current.c", "driver.c"), "f280049c": ("device.c", "dz_comp.c", "driver.c")}
+#: What of the model is compiled with the firmware; driver.c includes main.c, core.c stands in for the core.
+DRIVERS = TESTS / "support" / "devices"
+HEADERS = {"f28335": "DSP28x_Project.h", "f280049c": "driverlib.h"}
+PROTOTYPE = re.compile(r"^(?:void|bool|uint\w+_t) (\w+)\((.*?)\);", re.MULTILINE | re.DOTALL)
 #: Runs periods, an event each; then what the start is like (W: after a watchdog reset, C: without crystal).
 Run = Callable[..., list[dict]]
 #: File, what stands in it, and what stands there with the fault.
@@ -54,6 +58,18 @@ def seeded(texts: Mapping[str, str], edit: Edit) -> dict[str, str]:
     return {**texts, file: before + new + after}
 
 
+def model_of(board: str, *drivers: str) -> list[Path]:
+    """Return the C files of a device's model, with some of the drivers."""
+    model = sorted((MODELS / board).glob("*.c"))
+    return [*model, MODELS / "programs" / "engine.c", DRIVERS / "periods.c", *(DRIVERS / name for name in drivers)]
+
+
+def model_options(board: str, *folders: Path) -> list[str]:
+    """Return the options to compile the model of a device with the files of some folders."""
+    places = (*folders, MODELS / board, MODELS / "programs", DRIVERS)
+    return [f"-D{board.upper()}", *(f"-I{place}" for place in dict.fromkeys(places))]
+
+
 @cache
 def program(board: str, form: str = ONE, edit: Edit | None = None, options: tuple[str, ...] = ()) -> Path:
     """Return the compiled firmware; a call that does not fit the types of TI's stand-ins is an error."""
@@ -62,15 +78,36 @@ def program(board: str, form: str = ONE, edit: Edit | None = None, options: tupl
     base = program(board, form, None, options).parent if edit and edit[0].endswith(".c") else folder
     write({edit[0]: seeded(texts, edit)[edit[0]]} if base != folder else seeded(texts, edit) if edit else texts, folder)
     units = [base / name for name in texts if name.endswith(".c") and name != "main.c"]
-    units += [DEVICES / board / name for name in MODEL[board]]
+    units += model_of(board, "core.c", "driver.c")
     changed = {edit[0].replace("main.c", "driver.c")} if base != folder else {unit.name for unit in units}
+    include = ["-DSTAND_IN_CORE", *model_options(board, folder, base)]
     for unit in (unit for unit in units if unit.name in changed):
         source = folder / unit.name if unit.parent == base else unit
-        include = [f"-I{each}" for each in dict.fromkeys((folder, base, DEVICES / board))]
-        compiled(*options, *include, "-c", source, "-o", folder / f"{unit.stem}.o")
+        own = options if unit.parent == base or unit.name == "driver.c" else ()
+        compiled(*own, *include, "-c", source, "-o", folder / f"{unit.stem}.o")
     objects = [(folder if unit.name in changed else base) / f"{unit.stem}.o" for unit in units]
     compiled(*objects, "-lm", "-o", folder / "program")
     return folder / "program"
+
+
+@cache
+def calls_of(board: str, form: str = ONE, edit: Edit | None = None, *options: str) -> list[str]:
+    """Return what a firmware calls of TI's functions, as written there: up to the interrupts, and in two of them."""
+    header = Path(_SCRATCH.name) / f"calls_of_{board}.h"
+    text = (MODELS / board / HEADERS[board]).read_text("utf-8") + (MODELS / board / "device.h").read_text("utf-8")
+    names = [name for name, _ in PROTOTYPE.findall(text) if not re.match("device_(sci|octet|eallow|edis)", name)]
+    lines = [
+        "#include <stdio.h>",
+        f'#include "{HEADERS[board]}"',
+        '#include "device.h"',
+        "#define TEXT(...) #__VA_ARGS__",
+    ]
+    lines += ['#define CALLED(name, ...) (puts(#name " " TEXT(__VA_ARGS__)), (name)(__VA_ARGS__))']
+    lines += [f"#define {name}(...) CALLED({name}, __VA_ARGS__)" for name in names]
+    header.write_text("\n".join([*lines, ""]), encoding="utf-8")
+    made = program(board, form, edit, ("-include", str(header), "-Wno-pedantic", "-Wno-unused-value", *options))
+    plain = (re.sub(r"\b(\d+)u\b", r"\1", line.replace(", ", " ").strip()) for line in run(made, "main"))
+    return [line.replace("&", "") for line in plain]
 
 
 def compiled(*words: str | Path) -> None:

@@ -14,9 +14,7 @@ from dzdesign.verify.verification import verify as verify_folder
 #: Every requirement on a firmware, and those that every `verify` tries.
 DECLARED = tuple(each for row in REQUIREMENTS for each in row.requirements)
 ALWAYS = tuple(each for each in DECLARED if each.how == EVERY_RUN)
-LOOP = ClosedLoopResult(
-    plant=None, plant_source="none", plant_sha256=None, dynamics=None, back_MPa=(), pressures=()
-)
+LOOP = ClosedLoopResult(plant=None, plant_source="none", plant_sha256=None, dynamics=None, back_MPa=(), pressures=())
 EVIDENCE = Evidence(
     tool=THIS_TOOL, made_from=(), target="f28335", changed_board_files=(), user_files=(), differing_files={},
     board_not_compiled="",

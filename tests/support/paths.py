@@ -8,4 +8,3 @@ ROOMS = ("core", "derivation", "identify", "design", "codegen", "verify", "asses
 TESTS = ROOT / "tests"
 GOLDENS = TESTS / "goldens"
 GOLDENS_FULL = TESTS / "goldens_full"
-DEVICES = TESTS / "support"

@@ -35,9 +35,7 @@ def side_figures(rng: np.random.Generator) -> dict[str, Cell]:
     }
 
 
-def lot_rows(
-    count: int, *, failed: Sequence[int] = (), bipolar: bool = False, seed: int = 3
-) -> list[dict[str, Cell]]:
+def lot_rows(count: int, *, failed: Sequence[int] = (), bipolar: bool = False, seed: int = 3) -> list[dict[str, Cell]]:
     """Return a table: valves by number, some of which are not calibrated."""
     rows = []
     for number in range(count):

@@ -15,9 +15,7 @@ SLOTS, LINKED = 2, 2
 OPTIONS = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Wconversion", "-Wpedantic", "-Werror")
 
 
-def build_drive(
-    compiler: str, files: Mapping[str, str], folder: Path, *more: str, program: bool = False
-) -> Path:
+def build_drive(compiler: str, files: Mapping[str, str], folder: Path, *more: str, program: bool = False) -> Path:
     """Compile the load code, the block's check and the bench around them, as a library or as a program."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in files.items():

@@ -7,7 +7,7 @@
 #define MOST_CONVERSIONS 64u
 
 struct pwm pwms[MODULES];
-int64_t now;
+int64_t now, conversion_delay;
 double sysclk_hz = 1e6, watchdog_s;
 bool counters_run, watchdog_on, interrupts_on;
 uint8_t outside[GPIOS];
@@ -222,6 +222,7 @@ void convert(const struct conversion *conversion)
     if ((conversion_count < MOST_CONVERSIONS) && converter_hears(conversion->channel))
     {
         conversions[conversion_count] = *conversion;
+        conversions[conversion_count].done += conversion_delay;
         conversion_count++;
     }
 }

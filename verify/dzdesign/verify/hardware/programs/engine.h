@@ -51,6 +51,7 @@ extern int64_t now;
 extern double sysclk_hz;
 extern bool counters_run, watchdog_on, interrupts_on;
 extern double watchdog_s;
+extern int64_t conversion_delay; /* so much later a converter is done */
 extern uint8_t outside[GPIOS]; /* enum level of what is wired to a pin */
 
 /* Of the main program. */

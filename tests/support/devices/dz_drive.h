@@ -10,6 +10,7 @@ struct dz_drive
     uint16_t law;
     int16_t side;
 };
+extern unsigned device_drive_samples, device_drive_ticks; /* calls since it was at rest */
 void dz_drive_init(struct dz_drive *drive);
 void dz_drive_sample(struct dz_drive *drive, uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
 void dz_drive_tick(struct dz_drive *drive);

@@ -1,7 +1,0 @@
-#ifndef DZ_COMP_H
-#define DZ_COMP_H
-#include <stdint.h>
-#define DZ_COMPARE_MAX 40000u
-#define DZ_ADC_CODE_MAX 4095u
-uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
-#endif
