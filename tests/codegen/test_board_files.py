@@ -66,7 +66,7 @@ def test_they_are_marked_in_their_first_lines_and_in_the_manifest(compensator):
             assert name in bare or ("Do not edit" in head) is (name not in target.board)
             assert name in bare or not re.search(r"20\d\d-\d\d-\d\d", text), "no date"
     assert found["cortex-m4"] == tuple(f"cortex_m4/{name}" for name in BOARD)
-    assert found["f28335"] == (PROJECT,) and found["host"] == ()
+    assert found["f28335"] == ("board/dz_user.c", "f28335/dz_board.h", PROJECT) and found["host"] == ()
 
 
 def test_the_readme_marks_the_same_files(cortex):

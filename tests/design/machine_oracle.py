@@ -59,9 +59,7 @@ def threshold_factors(machine) -> tuple[list[float], float]:
             for sign, bench in product(SIGNS, repeat=2)
         ]
     moved = product(drives, SIGNS, SIGNS)
-    factors = [
-        drive * (1 + oil * machine.oil_error) * (1 + age * machine.ageing_error) for drive, oil, age in moved
-    ]
+    factors = [drive * (1 + oil * machine.oil_error) * (1 + age * machine.ageing_error) for drive, oil, age in moved]
     return factors, (machine.current_rest_error or 0.0)
 
 

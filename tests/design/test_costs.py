@@ -8,6 +8,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from dzdesign.codegen.amplifier.device import device_named
+from dzdesign.codegen.amplifier.setting import amplifier_setting
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import FlowUnit, PressureUnit, RecordedUnits
 from dzdesign.design.costs import lines_of_tests, machine_costs
@@ -19,7 +21,7 @@ from dzdesign.design.costs_at_tests import (
     remaining_dead_zone,
 )
 from dzdesign.design.fixed_offset import Characteristic, dead_zones
-from dzdesign.design.redesign import hysteresis_choices
+from dzdesign.design.redesign import hysteresis_choices, without_sensors
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.valve.reading_flow import dead_zone_at, default_reading_flow, ideal_line
 from dzdesign.terminal.design_tables import print_choices, print_compensator
@@ -136,6 +138,16 @@ def test_what_the_sweeps_cannot_tell_of_a_play_is_said_where_it_is_recommended(e
     assert "small command cycles" in capsys.readouterr().out
     print_choices([each for each in found if "play" not in each.given], "0.60 L/min")
     assert "small command cycles" not in capsys.readouterr().out
+
+
+def test_a_fixed_offset_leaves_what_an_amplifiers_setting_leaves(example_valve):
+    """The device of the finest steps, read at the opening knees."""
+    compensator = designed(example_valve)
+    setting = amplifier_setting(compensator, device_named("west"))
+    left = [each.fixed["opening"] for each in dead_zones(compensator, setting.characteristics[1])]
+    found = without_sensors(compensator)
+    assert found.onset == pytest.approx(max(left), abs=3e-4) and found.reading > found.onset
+    assert found.onset > 5 * choices(example_valve)[1].onset, "the price of no sensors"
 
 
 def test_the_dead_zone_between_the_tests_counts():

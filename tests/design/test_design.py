@@ -176,9 +176,7 @@ def test_the_transition_ends_at_or_above_the_opening_threshold_at_every_test(wit
 
 @pytest.mark.slow
 @needs_compiler
-def test_the_closed_loop_has_no_leak_one_per_cent_of_dead_zone_and_reads_what_design_says(
-    example_valve, tmp_path
-):
+def test_the_closed_loop_has_no_leak_one_per_cent_of_dead_zone_and_reads_what_design_says(example_valve, tmp_path):
     """The goal with hysteresis, PWM resolved, on the recorded characteristic.
 
     Two ways to the reading: the law turned round at the recorded threshold, and the generated C driving the flow.

@@ -23,6 +23,7 @@ from dzdesign.design.costs_at_tests import (
     remaining_dead_zone,
 )
 from dzdesign.design.designing import design
+from dzdesign.design.fixed_offset import fixed_offset, jump, zero_band
 from dzdesign.design.lot_setting import prove_lot
 from dzdesign.design.lot_valves import LotSide
 from dzdesign.design.options import options_of
@@ -37,6 +38,8 @@ WAYS: Mapping[str, Mapping[str, str]] = {
     "--transition auto": {"transition": "auto", "hysteresis": "keep"},
     "--hysteresis play": {"transition": "auto", "hysteresis": "play"},
 }
+#: What an amplifier without pressure sensors does: the price of having none.
+FIXED = "fixed offset, no pressure sensors"
 #: Share of command by which a less simple choice must leave less to be recommended.
 WORTH = 0.002
 
@@ -163,6 +166,27 @@ def hysteresis_choices(compensator: Compensator) -> tuple[HysteresisChoice, ...]
         if other.left < best.left - WORTH:
             best = other
     return tuple(replace(each, recommended=each is best and each.onset is not None) for each in found)
+
+
+def without_sensors(compensator: Compensator) -> HysteresisChoice:
+    """Return what the largest certified offset leaves that is the same at every pressure drop: that of an amplifier."""
+    onsets: list[float] = []
+    read: list[float] = []
+    try:
+        for sign in compensator.signals.signs:
+            offset = fixed_offset(compensator, sign).share
+            drives = jump(offset, Fraction(1), zero_band(compensator, sign))
+            for test in compensator.valve.sides[SIDE_NAMES[sign]].tests:
+                rising = test.recorded.rising
+                at_reading = rising.command_at(compensator.reading_flow_L_min) if rising else None
+                for threshold_V, left in ((test.u_knee_rising_V, onsets), (at_reading, read)):
+                    if threshold_V is not None:
+                        at = drives.command_at(Fraction(repr(float(threshold_V))) / compensator.u_max_V)
+                        left.append(1.0 if at is None else float(at))
+    except InputError as error:
+        return HysteresisChoice(given=FIXED, refused=str(error))
+    reading = max(read) if read and len(read) == len(onsets) else None
+    return HysteresisChoice(given=FIXED, onset=max(onsets, default=None), reading=reading)
 
 
 def _judged(given: str, made: Compensator) -> HysteresisChoice:

@@ -35,11 +35,13 @@ def _rational(value: "Fraction") -> str:
 
 def print_design(compensator: "Compensator") -> None:
     """Print a compensator, and what each way with the hysteresis would leave."""
-    from dzdesign.design.redesign import hysteresis_choices
+    from dzdesign.design.redesign import hysteresis_choices, without_sensors
 
     print_compensator(compensator)
     read_at = compensator.valve.recorded_units.text(compensator.reading_flow_L_min, ".2f L/min")
-    print_choices(hysteresis_choices(compensator), read_at, dithered=compensator.valve.dither is not None)
+    choices = hysteresis_choices(compensator)
+    beside = (without_sensors(compensator), *choices) if choices else ()
+    print_choices(beside, read_at, dithered=compensator.valve.dither is not None)
 
 
 def print_compensator(compensator: "Compensator", console: "Console | None" = None) -> None:

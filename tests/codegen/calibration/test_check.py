@@ -26,6 +26,7 @@ from tests.support.synthetic import needs_compiler
 
 pytestmark = needs_compiler
 
+
 def with_current(compensator):
     """A firmware and block with current control and the supply measured, beside what the compensator has."""
     loop = replace(PLAIN, supply=SUPPLY)

@@ -82,7 +82,8 @@ def option_sets() -> dict[str, DesignOptions]:
         "everything": full,
         "two solenoids alone": DesignOptions(signals=full.signals, **FOLLOWS_AT_ONCE),
         "turned, same pressures": replace(
-            full, signals=replace(full.signals, command=turned("-10..10 V x 0.15 + 1.5 V"), swapped=False),
+            full,
+            signals=replace(full.signals, command=turned("-10..10 V x 0.15 + 1.5 V"), swapped=False),
             negative_dp="wired",
         ),
         "one solenoid alone": plain,
@@ -154,8 +155,11 @@ FAULTS = [
     ("(uint32_t)fallen", "(uint32_t)rising", "two solenoids, play"),
     ("0, codes);", "0, codes - 1);", "two solenoids, play"),
     ("within(towards - (int32_t)block->zero_band", "within(towards", "two solenoids, play"),
-    ("side = (drive->side < 0) ? &block->sides[1]", "side = (drive->side < 0) ? &block->sides[0]",
-     "two solenoids, play"),
+    (
+        "side = (drive->side < 0) ? &block->sides[1]",
+        "side = (drive->side < 0) ? &block->sides[0]",
+        "two solenoids, play",
+    ),
     ("place & (step - 1u)", "0u", "two solenoids, play"),
     (" || (drive->side != driven)", "", "two solenoids, play"),
     ("drive->ticks < block->dither_ticks", "drive->ticks <= block->dither_ticks", "everything"),

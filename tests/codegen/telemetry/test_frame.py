@@ -203,8 +203,12 @@ def test_a_frame_is_of_one_moment_wherever_the_interrupt_comes(firmware):
 @pytest.mark.slow
 @needs_compiler
 def test_a_state_read_once_is_torn(firmware):
-    edit(firmware, "dz_telemetry.c", "(dz_state.ticks == copy->ticks) ? 1u : 0u",
-         "(dz_state.ticks == copy->ticks) ? 1u : 1u")
+    edit(
+        firmware,
+        "dz_telemetry.c",
+        "(dz_state.ticks == copy->ticks) ? 1u : 0u",
+        "(dz_state.ticks == copy->ticks) ? 1u : 1u",
+    )
     assert torn(preempted_frames(firmware))
 
 

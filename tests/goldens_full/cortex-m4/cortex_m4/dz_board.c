@@ -1,5 +1,5 @@
 /* Written by dzdesign 1.0.0 from template dz_board.c.jinja. Yours to edit: `dzdesign codegen` keeps what */
-/* you change here, and `dzdesign verify` names this file as yours and does not check it. */
+/* you change here, and `dzdesign verify` names this file as yours. */
 
 #include "dz_board.h"
 

@@ -1,5 +1,5 @@
 /* Written by dzdesign 1.0.0 from template startup.c.jinja. Yours to edit: `dzdesign codegen` keeps what */
-/* you change here, and `dzdesign verify` names this file as yours and does not check it. */
+/* you change here, and `dzdesign verify` names this file as yours. */
 
 /* From reset to main(), in C: on ARMv7-M the processor loads the stack pointer itself (DDI 0403, B1.5.3). */
 #include <stdint.h>
