@@ -14,7 +14,7 @@ from dzdesign.core.errors import RequirementError
 from dzdesign.verify import requirements
 from dzdesign.verify.exhaustive.exact_drive import STEP_UNIT, DriveModel
 from dzdesign.verify.hardware.exact_current import ExactCurrent
-from dzdesign.verify.hardware.model import ALL_CHANNELS, HIGH, LOW, Bench, Step, Trace
+from dzdesign.verify.hardware.model import HIGH, LOW, Bench, Step, Trace
 from dzdesign.verify.requirements import Check, Requirement
 
 #: A trip acts without a clock, and lost samples are seen within these times.
@@ -294,12 +294,16 @@ def _trips(runs: HardwareRuns) -> str:
 
 
 def _loses_samples(runs: HardwareRuns) -> str:
-    lost = {ALL_CHANNELS: "samples were lost"}
-    if runs.drive:
-        lost[runs.bench.channels["CURRENT"]] = "codes of the current were lost"
-    for channel, cause in lost.items():
+    lost = {"samples were lost": INPUTS, "codes of the current were lost": ("CURRENT",)}
+    for cause, roles in lost.items():
+        if "CURRENT" in roles and runs.drive is None:
+            continue
         again_us = runs.happens_us + SAMPLE_LOSS_S * 1e6
-        steps = (Step(runs.happens_us, "converter", 0, channel), Step(again_us, "converter", 1, channel))
+        steps = [
+            Step(at_us, "converter", hears, runs.bench.channels[role])
+            for role in roles
+            for at_us, hears in ((runs.happens_us, 0), (again_us, 1))
+        ]
         if found := _switched_off(runs, SAMPLE_LOSS_S, cause, *steps):
             return found
     return ""

@@ -25,7 +25,6 @@ OPTIONS = ("-O1", "-Wenum-conversion", "-Wno-pedantic")
 MAIN_OPTIONS = ("-Dmain=firmware_main", "-finstrument-functions", "-D_FLASH")
 RUN_S = 30.0
 LOW, HIGH = 0, 1
-ALL_CHANNELS = 16
 #: What a channel converts to that no input is wired to.
 NONSENSE = 4000
 LINE = re.compile(r"(\d+) ([a-z]+) (\d+) (\d+)", re.ASCII)

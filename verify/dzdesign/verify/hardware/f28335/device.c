@@ -299,7 +299,8 @@ void start_conversions(unsigned module, enum trigger trigger)
     const unsigned last = (trigger == SOC_A) ? AdcRegs.ADCMAXCONV.bit.MAX_CONV1 : AdcRegs.ADCMAXCONV.bit.MAX_CONV2;
 
     (void)module; /* all modules' starts are one signal */
-    if ((listens == 0u) || ((trigger == SOC_B) && (cascaded != 0u)) || !peripherals_clocked || is_busy(group))
+    if ((listens == 0u) || ((trigger == SOC_B) && (cascaded != 0u)) || !peripherals_clocked || is_busy(group) ||
+        !converter_hears(channel_of((trigger == SOC_A) ? sequencers[0] : 8u + sequencers[1])))
     {
         return;
     }

@@ -110,7 +110,7 @@ static void event(unsigned module, enum event what)
                 pwm->interrupt_waits = pwm->interrupt_waits || !pwm->interrupt_flag;
                 pwm->interrupt_flag = true;
             }
-            else if (converter_hears(ALL_CHANNELS))
+            else
             {
                 start_conversions(module, (enum trigger)each);
             }

@@ -9,7 +9,7 @@
 
 #define MODULES 8u
 #define GPIOS 64u
-#define ALL_CHANNELS 16u
+#define CHANNELS 16u
 #define NEVER INT64_MAX
 #define FIRST_CODE 0x0FFFu /* of the first conversion of a sequence: it may be anything */
 

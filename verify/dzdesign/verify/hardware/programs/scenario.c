@@ -5,7 +5,7 @@
  *
  * What happens from a time on, counted from where interrupts are enabled, or -1 before the start:
  * code CHANNEL CODE     what a channel converts to             wire GPIO LEVEL     0 low, 1 high, 2 open
- * converter ON CHANNEL  whether starts of it, or all, are heard  interrupts ON 0     whether the processor takes them
+ * converter ON CHANNEL  whether its starts are heard          interrupts ON 0     whether the processor takes them
  * compare A B           written after each interrupt           coil CHANNEL GPIO   a solenoid and its sensor, with
  * sensor CODES_PER_A ZERO_CODE, winding OHM HENRY, supply V DIODE_V and flows A 0 (at the start)
  *
@@ -36,9 +36,9 @@ void __cyg_profile_func_exit(void *function, void *caller);
 static struct step *steps;
 static unsigned step_count, step_at;
 static double started_s, end_s;
-static bool started, writes, interrupts_off, deaf[ALL_CHANNELS + 1u];
-static uint16_t codes[ALL_CHANNELS], compares[2];
-static unsigned coil_channel = ALL_CHANNELS, coil_gpio = GPIOS;
+static bool started, writes, interrupts_off, deaf[CHANNELS];
+static uint16_t codes[CHANNELS], compares[2];
+static unsigned coil_channel = CHANNELS, coil_gpio = GPIOS;
 static struct solenoid solenoid;
 static jmp_buf out;
 
