@@ -12,6 +12,7 @@ import sys
 import pytest
 
 from dzdesign.codegen.target import folder_of
+from dzdesign.verify.hardware.model import HERE as MODELS
 from dzdesign.verify.toolchain.host_compiler import STRICT
 from tests.support.drive_model import walked_line
 from tests.support.golden_firmware import (
@@ -26,7 +27,6 @@ from tests.support.golden_firmware import (
     write,
 )
 from tests.support.grid_hash import GRID, SAMPLE, exact_line
-from tests.support.paths import DEVICES
 
 WARNINGS = " ".join(("-O2", *STRICT[1:]))
 
@@ -130,7 +130,7 @@ def test_core_and_self_test_compile_strictly(root, target, compiler, copy):
 def test_firmware_of_the_c2000_compiles_strictly_with_the_real_core(root, target, compiler, copy):
     """Against the stand-ins for TI's headers; avr-gcc because its int has 16 bits, as TI's."""
     folder = copy(target, root)
-    include = [f"-I{path}" for path in (folder / "core", folder / target, DEVICES / target)]
+    include = [f"-I{path}" for path in (folder / "core", folder / target, MODELS / target)]
     sources = sorted((folder / target).glob("*.c"))
     assert len(sources) >= 2
     run(*compiler.split(), *STRICT, *include, "-c", *map(str, sources), cwd=folder)

@@ -132,7 +132,9 @@ def periods(program: Path, events: str, *start: str) -> list[dict]:
 
 def running(board: str, form: str = ONE, edit: Edit | None = None) -> Run:
     """Return the function that runs a firmware through periods; `.args[0]` is its program."""
-    return partial(periods, program(board, form, edit))
+    run = partial(periods, program(board, form, edit))
+    run.of = (board, form, edit)
+    return run
 
 
 def column(ticks: list[dict], key: str) -> list:

@@ -16,7 +16,7 @@ from tests.codegen.test_c2000 import (
     check_zero_command,
     of_current_on,
 )
-from tests.support.c2000_devices import ONE, TWO, column, program, run, running
+from tests.support.c2000_devices import ONE, TWO, calls_of, column, program, running
 from tests.support.example_coil import SENSORS
 from tests.support.synthetic import needs_compiler
 
@@ -34,10 +34,10 @@ CALLS = {
         "EPWM_setCounterCompareValue EPWM1_BASE EPWM_COUNTER_COMPARE_B 2000",
         "EPWM_setADCTriggerEventPrescale EPWM1_BASE EPWM_SOC_A 2",
         "EPWM_setInterruptEventCount EPWM1_BASE 1",
-        *(f"ADC_setupSOC ADCA_BASE {n} ADC_TRIGGER_EPWM1_SOCA ADC_CH_ADCIN{n} 50" for n in range(3)),
+        *(f"ADC_setupSOC ADCA_BASE ADC_SOC_NUMBER{n + 1} ADC_TRIGGER_EPWM1_SOCA ADC_CH_ADCIN{n} 50" for n in range(3)),
         "ADC_setVREF ADCA_BASE ADC_REFERENCE_INTERNAL ADC_REFERENCE_3_3V",
         "SysCtl_setWatchdogMode SYSCTL_WD_MODE_RESET",
-        "Interrupt_register INT_EPWM1",
+        "Interrupt_register INT_EPWM1 dz_isr",
     ),
     PLAIN: (
         "EPWM_setCounterCompareValue EPWM1_BASE EPWM_COUNTER_COMPARE_B 33000",
@@ -51,19 +51,19 @@ CALLS = {
         "XBAR_setInputPin XBAR_INPUT2 13",
         "ADC_setSOCPriority ADCA_BASE ADC_PRI_THRU_SOC7_HIPRI",
         "ADC_setBurstModeConfig ADCA_BASE ADC_TRIGGER_EPWM2_SOCA 1",
-        "ADC_setInterruptSource ADCA_BASE ADC_INT_NUMBER1 2",
-        "ADC_setInterruptSource ADCA_BASE ADC_INT_NUMBER2 15",
-        *(f"ADC_setupSOC ADCA_BASE {n} ADC_TRIGGER_SW_ONLY ADC_CH_ADCIN3 50" for n in range(8, 16)),
+        "ADC_setInterruptSource ADCA_BASE ADC_INT_NUMBER1 ADC_SOC_NUMBER3",
+        "ADC_setInterruptSource ADCA_BASE ADC_INT_NUMBER2 ADC_SOC_NUMBER15",
+        *(f"ADC_setupSOC ADCA_BASE ADC_SOC_NUMBER{n} ADC_TRIGGER_SW_ONLY ADC_CH_ADCIN3 50" for n in range(8, 16)),
     ),
     SUPPLY: (
-        "ADC_setupSOC ADCA_BASE 3 ADC_TRIGGER_EPWM1_SOCA ADC_CH_ADCIN4 50",
-        "ADC_setInterruptSource ADCA_BASE ADC_INT_NUMBER1 3",
+        "ADC_setupSOC ADCA_BASE ADC_SOC_NUMBER4 ADC_TRIGGER_EPWM1_SOCA ADC_CH_ADCIN4 50",
+        "ADC_setInterruptSource ADCA_BASE ADC_INT_NUMBER1 ADC_SOC_NUMBER4",
     ),
 }
 
 
 def check_set_up(go, form: str = ONE) -> None:
-    calls = run(*go.args, "calls")
+    calls = calls_of(*go.of)
     assert [call for call in CALLS[form] if call not in calls] == []
     drives_second = [call for call in calls if call.startswith("GPIO_setPinConfig GPIO_2_")]
     assert form == ONE or not drives_second, "with current control ePWM2 drives no pin"
@@ -71,7 +71,7 @@ def check_set_up(go, form: str = ONE) -> None:
 
 def check_order(go) -> None:
     """The output is tripped before anything can drive it, and the interrupt comes last."""
-    calls = run(*go.args, "calls")
+    calls = calls_of(*go.of)
     at = calls.index
     trip = max(i for i, call in enumerate(calls[: at("device_eint")]) if call.startswith("EPWM_forceTripZoneEvent"))
     listened = at("EPWM_enableTripZoneSignals EPWM1_BASE EPWM_TZ_SIGNAL_OSHT1")
@@ -98,48 +98,49 @@ def test_the_set_up_calls_driverlib_as_it_documents_and_in_this_order(form):
 def test_a_busy_converter_gives_no_sample_and_the_watchdog_is_served_only_if_the_interrupt_ran():
     ticks = running("f280049c")("b" * 12)
     assert set(column(ticks, "output")) == {"low"} and ticks[-1]["fault"] == 1
-    assert run(program("f280049c"), "watchdog") == ["0", "1"]
+    turns = calls_of("f280049c")
+    without, with_one = turns.index("without an interrupt:"), turns.index("with one:")
+    assert "SysCtl_serviceWatchdog" not in turns[without:with_one] and "SysCtl_serviceWatchdog" in turns[with_one:]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("form", "file", "old", "new", "check"),
     [
-        (ONE, HARDWARE, "TimeBasePeriod(EPWM1_BASE, DZ_PWM_TBPRD)", "TimeBasePeriod(EPWM1_BASE, 9u)", check_set_up),
+        (ONE, HARDWARE, "TimeBasePeriod(DZ_PWM_A, DZ_PWM_TBPRD)", "TimeBasePeriod(DZ_PWM_A, 9u)", check_set_up),
         (ONE, HARDWARE, "EPWM_TZ_ACTION_LOW", "EPWM_TZ_ACTION_HIGH", check_order),
-        (ONE, HARDWARE, "EPWM_forceTripZoneEvent(EPWM1_BASE, EPWM_TZ_FORCE_EVENT_OST);", "", check_order),
-        (ONE, HARDWARE, "XBAR_INPUT1, DZ_TRIP_PIN", "XBAR_INPUT1, DZ_PWM_PIN", check_order),
+        (ONE, HARDWARE, "EPWM_forceTripZoneEvent(DZ_PWM_A, EPWM_TZ_FORCE_EVENT_OST);", "", check_order),
+        (ONE, HARDWARE, "XBAR_INPUT1, DZ_BOARD_TRIP_GPIO", "XBAR_INPUT1, DZ_BOARD_PWM_GPIO", check_order),
         (ONE, "main.c", "    dz_output_hold_low();", "", check_order),
         (ONE, HARDWARE, "EPWM_INT_TBCTR_U_CMPB", "EPWM_INT_TBCTR_ZERO", check_normal_running),
         (ONE, HARDWARE, "EPWM_SOC_A, DZ_TICKS_PER_SAMPLE", "EPWM_SOC_A, 1u", check_normal_running),
-        (ONE, HARDWARE, "ADC_INT_NUMBER1, ADC_SOC_NUMBER2", "ADC_INT_NUMBER1, ADC_SOC_NUMBER0", check_normal_running),
-        (ONE, HARDWARE, "ADC_CH_ADCIN1", "ADC_CH_ADCIN2", check_normal_running),
+        (ONE, HARDWARE, "DZ_BOARD_PRESSURE_A)", "DZ_BOARD_PRESSURE_B)", check_normal_running),
         (ONE, HARDWARE, "DEVICE_DELAY_US(1000);", "", check_normal_running),
         (ONE, HARDWARE, "        clear_flag(ADC_INT_NUMBER1);", "", check_normal_running),
-        (ONE, HARDWARE, "    EPWM_clearEventTriggerInterruptFlag(EPWM1_BASE);\n    Interrupt", "    Interrupt",
+        (ONE, HARDWARE, "    EPWM_clearEventTriggerInterruptFlag(DZ_PWM_A);\n    Interrupt", "    Interrupt",
          check_normal_running),
         (ONE, HARDWARE, "Interrupt_clearACKGroup(INTERRUPT_ACK_GROUP3);", "", check_normal_running),
         (ONE, HARDWARE, "(compare == 0u) ? EPWM_AQ_SW_OUTPUT_LOW : EPWM_AQ_SW_DISABLED", "EPWM_AQ_SW_DISABLED",
          check_zero_command),
-        (TWO, HARDWARE, "    EPWM_forceTripZoneEvent(EPWM2_BASE, EPWM_TZ_FORCE_EVENT_OST);\n}\n\nvoid dz_untrip",
+        (TWO, HARDWARE, "    EPWM_forceTripZoneEvent(DZ_PWM_B, EPWM_TZ_FORCE_EVENT_OST);\n}\n\nvoid dz_untrip",
          "}\n\nvoid dz_untrip", check_second_missing_samples),
-        (TWO, HARDWARE, "EPWM_clearTripZoneFlag(EPWM2_BASE, EPWM_TZ_FLAG_OST);", "", check_both_outputs),
-        (TWO, HARDWARE, "EPWM_enableTripZoneSignals(EPWM2_BASE, EPWM_TZ_SIGNAL_OSHT1);", "", check_both_outputs),
+        (TWO, HARDWARE, "EPWM_clearTripZoneFlag(DZ_PWM_B, EPWM_TZ_FLAG_OST);", "", check_both_outputs),
+        (TWO, HARDWARE, "EPWM_enableTripZoneSignals(DZ_PWM_B, EPWM_TZ_SIGNAL_OSHT1);", "", check_both_outputs),
         (PLAIN, HARDWARE, "EPWM_SOC_TBCTR_U_CMPA", "EPWM_SOC_TBCTR_ZERO", of_current("sampling")),
-        (PLAIN, HARDWARE, "EPWM2_BASE, EPWM_SOC_A, 1u", "EPWM2_BASE, EPWM_SOC_A, 2u", of_current("sampling")),
-        (PLAIN, HARDWARE, "    EPWM_enablePhaseShiftLoad(EPWM2_BASE);\n", "", of_current("sampling")),
-        (PLAIN, HARDWARE, "EPWM2_BASE, DZ_CURRENT_TBPRD", "EPWM2_BASE, DZ_PWM_TBPRD", of_current("sampling")),
-        (PLAIN, HARDWARE, "ADC_TRIGGER_EPWM2_SOCA, 1u", "ADC_TRIGGER_EPWM1_SOCA, 1u", of_current("sampling")),
+        (PLAIN, HARDWARE, "DZ_PWM_B, EPWM_SOC_A, 1u", "DZ_PWM_B, EPWM_SOC_A, 2u", of_current("sampling")),
+        (PLAIN, HARDWARE, "    EPWM_enablePhaseShiftLoad(DZ_PWM_B);\n", "", of_current("sampling")),
+        (PLAIN, HARDWARE, "DZ_PWM_B, DZ_CURRENT_TBPRD", "DZ_PWM_B, DZ_PWM_TBPRD", of_current("sampling")),
+        (PLAIN, HARDWARE, "DZ_CURRENT_TRIGGER, 1u", "DZ_PWM_TRIGGER, 1u", of_current("sampling")),
         (PLAIN, HARDWARE, "    ADC_enableBurstMode(ADCA_BASE);\n", "", of_current("sampling")),
         (PLAIN, "dz_hardware.h", "#define DZ_ISR_CMPB 33000u", "#define DZ_ISR_CMPB 2000u", of_current("sampling")),
-        (PLAIN, HARDWARE, "ADC_SOC_NUMBER11, ADC_TRIGGER_SW_ONLY, ADC_CH_ADCIN3",
-         "ADC_SOC_NUMBER11, ADC_TRIGGER_SW_ONLY, ADC_CH_ADCIN2", of_current("start")),
+        (PLAIN, HARDWARE, "ADC_SOC_NUMBER11, ADC_TRIGGER_SW_ONLY, DZ_CHANNEL(DZ_BOARD_CURRENT)",
+         "ADC_SOC_NUMBER11, ADC_TRIGGER_SW_ONLY, DZ_CHANNEL(DZ_BOARD_COMMAND)", of_current("start")),
         (PLAIN, HARDWARE, "ADC_readResult(ADCARESULT_BASE, ADC_SOC_NUMBER15)",
          "ADC_readResult(ADCARESULT_BASE, ADC_SOC_NUMBER0)", of_current("start")),
         (PLAIN, HARDWARE, "        clear_flag(ADC_INT_NUMBER2);", "", of_current("faults")),
         (PLAIN, HARDWARE, "EPWM_TZ_ACTION_LOW", "EPWM_TZ_ACTION_HIGH", of_current("start")),
-        (PLAIN, HARDWARE, "    XBAR_setInputPin(XBAR_INPUT2, DZ_OVER_CURRENT_PIN);", "", of_current("faults")),
-        (PLAIN, HARDWARE, " && (GPIO_readPin(DZ_OVER_CURRENT_PIN) != 0u)", "", of_current("closed_comparator")),
+        (PLAIN, HARDWARE, "    XBAR_setInputPin(XBAR_INPUT2, DZ_BOARD_OVER_CURRENT_GPIO);", "", of_current("faults")),
+        (PLAIN, HARDWARE, " && (GPIO_readPin(DZ_BOARD_OVER_CURRENT_GPIO) != 0u)", "", of_current("closed_comparator")),
     ],
 )  # fmt: skip
 def test_a_seeded_fault_is_caught(form, file, old, new, check):

@@ -17,11 +17,10 @@ from dzdesign.codegen.project import generate
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
 from dzdesign.design.signals import Signals
-from tests.support.c2000_devices import Edit, column, compiled, periods, seeded, write
+from tests.support.c2000_devices import Edit, column, compiled, model_of, model_options, periods, seeded, write
 from tests.support.core_variants import BOTH
 from tests.support.example_coil import SENSORS, with_current
 from tests.support.golden_firmware import FULL, full_options, golden_compensator, golden_valve
-from tests.support.paths import DEVICES
 from tests.support.synthetic import needs_compiler
 
 pytestmark = [pytest.mark.slow, needs_compiler]
@@ -66,11 +65,9 @@ class Firmware:
         write(seeded(texts, edit) if edit else texts, folder)
         # driver.c includes main.c.
         sources = [folder / name for name in texts if name.endswith(".c") and name != "main.c"]
-        model = DEVICES / "f280049c"
         self.program = folder / "program"
-        compiled(
-            f"-I{folder}", f"-I{model}", *sources, model / "device.c", model / "driver.c", "-lm", "-o", self.program
-        )
+        model = model_of("f280049c", "driver.c")
+        compiled(*model_options("f280049c", folder), *sources, *model, "-lm", "-o", self.program)
 
     def flashed(self, block: bytes) -> Path:
         """Return the program with these octets in the place of its block."""

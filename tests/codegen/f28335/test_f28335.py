@@ -20,16 +20,17 @@ from tests.codegen.test_c2000 import (
     compare_of_sample,
     of_current_on,
 )
-from tests.support.c2000_devices import ONE, TWO, column, program, run, running, texts_of
+from tests.support.c2000_devices import ONE, TWO, calls_of, column, run, running, texts_of
 from tests.support.synthetic import needs_compiler
 
 HARDWARE = "dz_hardware.c"
 of_current = of_current_on("f28335")
 PLAIN, SUPPLY = "supply unknown", "supply measured"
+#: The resets of the sequencers in ADCTRL2 clear themselves.
 START_VALUES = {
     "TBCTL": 0x0000, "TBPRD": 0xEA5F, "CMPCTL": 0x0000, "CMPB": 0x0BB8, "AQCTLA": 0x0012, "ETSEL": 0x090E,
-    "ETPS": 0x0201, "TZSEL": 0x0100, "TZCTL": 0x0002, "ADCTRL1": 0x0F10, "ADCTRL2": 0x4100, "ADCTRL3": 0x00E2,
-    "ADCMAXCONV": 0x0002, "ADCCHSELSEQ1": 0x0210, "HISPCP": 0x0003, "PLLCR": 0x000A,
+    "ETPS": 0x0201, "TZSEL": 0x0100, "TZCTL": 0x0002, "ADCTRL1": 0x0F10, "ADCTRL2": 0x0100, "ADCTRL3": 0x00E2,
+    "ADCMAXCONV": 0x0003, "ADCCHSELSEQ1": 0x2100, "HISPCP": 0x0003, "PLLCR": 0x000A,
     "LOSPCP": 0x0001, "SCICCR": 0x0007, "SCICTL1": 0x0022, "SCICTL2": 0x0000, "SCIHBAUD": 0x0000, "SCILBAUD": 0x0050,
     "SCIFFTX": 0xE000, "SCIFFRX": 0x0000, "SCIFFCT": 0x0000, "GPIO28_MUX": 1, "GPIO28_QUALIFIER": 3, "GPIO29_MUX": 1,
     "TBCLKSYNC": 1, "WDCR": 0x0028, "SCSR": 0, "GPIO0_MUX": 1, "GPIO0_PULLUP_OFF": 1, "GPIO12_MUX": 1,
@@ -50,12 +51,12 @@ SECOND_VALUES = {
 OF_CURRENT = ("ADCCHSELSEQ3", "ADCCHSELSEQ4", "GPIO13_MUX", "TRIGGER_CMPA", "TRIGGER_ETPS")
 #: With current control: two sequencers, the counter of ePWM2, a later interrupt, two trip inputs.
 CURRENT_VALUES = {
-    "TBCTL": 0x0010, "CMPB": 0xC15C, "TZSEL": 0x0300, "ADCTRL1": 0x0F00, "ADCTRL2": 0x4141, "ADCCHSELSEQ3": 0x3333,
+    "TBCTL": 0x0010, "CMPB": 0xC15C, "TZSEL": 0x0300, "ADCTRL1": 0x0F00, "ADCTRL2": 0x0101, "ADCCHSELSEQ3": 0x3333,
     "ADCCHSELSEQ4": 0x3333, "GPIO13_MUX": 1, "SECOND_TBCTL": 0x0004, "SECOND_TBPRD": 0x1D4B, "SECOND_CMPCTL": 0x0010,
     "TRIGGER_CMPA": 0x0DC8, "SECOND_ETSEL": 0xC000, "TRIGGER_ETPS": 0x1000, "SECOND_AQCTLA": 0, "GPIO2_MUX": 0,
 }  # fmt: skip
-#: And with the supply measured: a fourth conversion of the sample.
-SUPPLY_VALUES = {"ADCMAXCONV": 0x0003, "ADCCHSELSEQ1": 0x4210}
+#: And with the supply measured: one conversion more of the sample.
+SUPPLY_VALUES = {"ADCMAXCONV": 0x0004, "ADCCHSELSEQ2": 0x0004}
 #: What the registers hold by the form.
 VALUES = {
     ONE: START_VALUES,
@@ -95,7 +96,7 @@ def test_registers_hold_what_the_manual_says(form):
     check_values(go, VALUES[form])
     if form == ONE:
         found = registers(go)
-        assert {found[name] for name in SECOND_VALUES if name.startswith(("SECOND", "GPIO2_"))} == {0, 0x0083}, "reset"
+        assert {found[name] for name in SECOND_VALUES if name.startswith(("SECOND", "GPIO2_MUX"))} == {0, 0x83}, "reset"
 
 
 def check_left_behind(go, expected: dict[str, int] = START_VALUES | LEFT_AT_ZERO) -> None:
@@ -176,11 +177,12 @@ def test_firmware_on_the_device_model(form, checks):
 
 @needs_compiler
 def test_start_up_order_and_watchdog():
-    after = ["InitPieCtrl", "InitPieVectTable", "InitAdc", "ServiceDog", "EINT", "ServiceDog",
-             "without an interrupt:", "with one:", "ServiceDog"]  # fmt: skip
-    assert run(program("f28335"), "main") == ["InitSysCtrl", "DINT", *after]
-    flash = program("f28335", ONE, None, ("-D_FLASH",))
-    assert run(flash, "main") == ["InitSysCtrl", "DINT", "MemCopy", "InitFlash", *after]
+    before = ["DisableDog", "InitPll 10 2", "InitPeripheralClocks", "device_dint"]
+    after = ["InitPieCtrl", "InitPieVectTable", "InitAdc", "ServiceDog", "device_eint", "ServiceDog",
+             "without an interrupt:", "with one:", "ServiceDog", "services 3"]  # fmt: skip
+    copied = ["MemCopy RamfuncsLoadStart RamfuncsLoadEnd RamfuncsRunStart", "InitFlash"]
+    assert calls_of("f28335") == [*before, *after]
+    assert calls_of("f28335", ONE, None, "-D_FLASH") == [*before, *copied, *after]
 
 
 @needs_compiler
@@ -192,54 +194,54 @@ def test_start_up_order_and_watchdog():
         (ONE, HARDWARE, "TZA = TZ_FORCE_LO", "TZA = TZ_FORCE_HI", check_normal_running),
         (ONE, HARDWARE, "SOCAPRD = ET_2ND", "SOCAPRD = ET_1ST", check_delays),
         (ONE, HARDWARE, "INTSEL = ET_CTRU_CMPB", "INTSEL = ET_CTR_ZERO", check_normal_running),
-        (ONE, HARDWARE, "EPwm1Regs.TZFRC.bit.OST = 1u;", "", check_normal_running),
-        (ONE, HARDWARE, "    EALLOW;\n    EPwm1Regs.TZCTL", "    EPwm1Regs.TZCTL", check_registers),
+        (ONE, HARDWARE, "DZ_PWM_A.TZFRC.bit.OST = 1u;", "", check_normal_running),
+        (ONE, HARDWARE, "    EALLOW;\n    DZ_PWM_A.TZCTL", "    DZ_PWM_A.TZCTL", check_registers),
         (ONE, HARDWARE, "PieCtrlRegs.PIEACK.all = PIEACK_GROUP3;", "", check_normal_running),
         (ONE, HARDWARE, "PIEACK.all = PIEACK_GROUP3", "PIEACK.bit.ACK1 = 1u", check_service),
-        (ONE, HARDWARE, "    EPwm1Regs.ETCLR.bit.INT = 1u;\n    PieCtrl", "    PieCtrl", check_normal_running),
+        (ONE, HARDWARE, "    DZ_PWM_A.ETCLR.bit.INT = 1u;\n    PieCtrl", "    PieCtrl", check_normal_running),
         (ONE, HARDWARE, "        AdcRegs.ADCTRL2.bit.RST_SEQ1 = 1u;", "", check_normal_running),
         (ONE, HARDWARE, "ADCRESULT1", "ADCRESULT2", check_normal_running),
         (ONE, HARDWARE, "CMPB = DZ_ISR_CMPB", "CMPB = 0u", check_delays),
         (ONE, HARDWARE, "INTPRD = ET_1ST", "INTPRD = ET_2ND", check_normal_running),
-        (ONE, HARDWARE, "ACQ_PS = DZ_ADC_ACQ_PS", "ACQ_PS = 0u", check_delays),
+        (ONE, HARDWARE, "ACQ_PS = DZ_BOARD_ACQ_PS", "ACQ_PS = 0u", check_delays),
         (ONE, HARDWARE, "(compare == 0u) ? DZ_FORCE_LOW : DZ_FORCE_NONE", "DZ_FORCE_NONE", check_zero_command),
-        (ONE, HARDWARE, "EPwm1Regs.TBCTL.bit.FREE_SOFT = DZ_STOP_AT_PERIOD;", "", check_emulation_stop),
+        (ONE, HARDWARE, "DZ_PWM_A.TBCTL.bit.FREE_SOFT = DZ_STOP_AT_PERIOD;", "", check_emulation_stop),
         (ONE, HARDWARE, "    clear_leftovers();\n", "    (void)clear_leftovers;\n", check_left_behind),
-        (ONE, HARDWARE, "EPwm1Regs.DBCTL.all = 0u;", "", check_left_behind),
-        (ONE, HARDWARE, "    EALLOW;\n    EPwm1Regs.HRCNFG", "    EPwm1Regs.HRCNFG", check_left_behind),
+        (ONE, HARDWARE, "DZ_PWM_A.DBCTL.all = 0u;", "", check_left_behind),
+        (ONE, HARDWARE, "    EALLOW;\n    DZ_PWM_A.HRCNFG", "    DZ_PWM_A.HRCNFG", check_left_behind),
         (ONE, "dz_telemetry.c", "LOSPCP.all = DZ_SCI_LOSPCP", "LOSPCP.all = 2u", check_registers),
         (ONE, "dz_telemetry.c", "    EALLOW;\n    SysCtrlRegs", "    SysCtrlRegs", check_registers),
-        (ONE, "dz_telemetry.c", "GPAMUX2.bit.GPIO29 = 1u", "GPAMUX2.bit.GPIO29 = 2u", check_registers),
-        (TWO, HARDWARE, "EPwm2Regs.TZFRC.bit.OST = 1u;", "", check_second_registers),
-        (TWO, HARDWARE, "EPwm2Regs.TZCTL.bit.TZA = TZ_FORCE_LO", "EPwm2Regs.TZCTL.bit.TZA = 0u", check_both_outputs),
-        (TWO, HARDWARE, "EPwm2Regs.TZSEL.bit.OSHT1 = TZ_ENABLE", "EPwm2Regs.TZSEL.all = 0u", check_second_registers),
-        (TWO, HARDWARE, "EPwm2Regs.TBCTL.bit.PHSEN = TB_ENABLE;", "", check_both_outputs),
-        (TWO, HARDWARE, "EPwm2Regs.TZFRC.bit.OST = 1u;\n    EDIS;\n}\n\nvoid dz_un", "EDIS;\n}\n\nvoid dz_un",
+        (ONE, "dz_telemetry.c", "DZ_SCI_MUX.bit.DZ_SCI_TX = DZ_SCI_FUNCTION", "DZ_SCI_MUX.bit.DZ_SCI_TX = 2u", check_registers),
+        (TWO, HARDWARE, "DZ_PWM_B.TZFRC.bit.OST = 1u;", "", check_second_registers),
+        (TWO, HARDWARE, "DZ_PWM_B.TZCTL.bit.TZA = TZ_FORCE_LO", "DZ_PWM_B.TZCTL.bit.TZA = 0u", check_both_outputs),
+        (TWO, HARDWARE, "DZ_PWM_B.TZSEL.bit.DZ_TRIP_ONE_SHOT = TZ_ENABLE", "DZ_PWM_B.TZSEL.all = 0u", check_second_registers),
+        (TWO, HARDWARE, "DZ_PWM_B.TBCTL.bit.PHSEN = TB_ENABLE;", "", check_both_outputs),
+        (TWO, HARDWARE, "DZ_PWM_B.TZFRC.bit.OST = 1u;\n    EDIS;\n}\n\nvoid dz_un", "EDIS;\n}\n\nvoid dz_un",
          check_second_missing_samples),
-        (TWO, HARDWARE, "EPwm2Regs.TZCLR.bit.OST = 1u;", "", check_both_outputs),
+        (TWO, HARDWARE, "DZ_PWM_B.TZCLR.bit.OST = 1u;", "", check_both_outputs),
         (TWO, "dz_isr.c", "dz_drive_tick(&drive);", "if (fresh) { dz_drive_tick(&drive); }", check_drive_calls),
         (TWO, "dz_isr.c", "            if (fresh != 0u)", "            if (fresh <= 1u)", check_drive_calls),
         (TWO, "dz_isr.c", "        if (dz_state.released != 0u)", "        if (dz_state.ticks != 0u)",
          check_delayed_start),
         (PLAIN, HARDWARE, "SOCBSEL = ET_CTRU_CMPA", "SOCBSEL = ET_CTR_ZERO", of_current("sampling")),
         (PLAIN, HARDWARE, "ETPS.bit.SOCBPRD = ET_1ST", "ETPS.bit.SOCBPRD = ET_2ND", of_current("sampling")),
-        (PLAIN, HARDWARE, "EPwm2Regs.TBPRD = DZ_CURRENT_TBPRD", "EPwm2Regs.TBPRD = DZ_PWM_TBPRD",
+        (PLAIN, HARDWARE, "DZ_PWM_B.TBPRD = DZ_CURRENT_TBPRD", "DZ_PWM_B.TBPRD = DZ_PWM_TBPRD",
          of_current("sampling")),
-        (PLAIN, HARDWARE, "EPwm1Regs.TBCTL.bit.SYNCOSEL = TB_CTR_ZERO;", "", of_current("sampling")),
+        (PLAIN, HARDWARE, "DZ_PWM_A.TBCTL.bit.SYNCOSEL = TB_CTR_ZERO;", "", of_current("sampling")),
         (PLAIN, HARDWARE, "CMPA.half.CMPA = DZ_CURRENT_START", "CMPA.half.CMPA = 0u", of_current("sampling")),
         (PLAIN, HARDWARE, "SHDWAMODE = CC_IMMEDIATE", "SHDWAMODE = CC_SHADOW", check_current_registers),
         (PLAIN, "dz_hardware.h", "#define DZ_ISR_CMPB 49500u", "#define DZ_ISR_CMPB 3000u", of_current("sampling")),
         (PLAIN, HARDWARE, "SEQ_CASC = 0u", "SEQ_CASC = 1u", of_current("sampling")),
         (PLAIN, HARDWARE, "AdcRegs.ADCTRL2.bit.EPWM_SOCB_SEQ2 = 1u;", "", of_current("start")),
-        (PLAIN, "dz_hardware.h", "DZ_CURRENT_CHANNELS 0x3333u", "DZ_CURRENT_CHANNELS 0x3332u", of_current("start")),
+        (PLAIN, "dz_hardware.h", "(DZ_BOARD_CURRENT * 0x1111u)", "0x3332u", of_current("start")),
         (PLAIN, HARDWARE, "ADCCHSELSEQ4.all = DZ_CURRENT_CHANNELS", "ADCCHSELSEQ4.all = 0u", of_current("start")),
         (PLAIN, HARDWARE, "AdcMirror.ADCRESULT15", "AdcMirror.ADCRESULT0", of_current("start")),
-        (PLAIN, HARDWARE, "CONV00 = 0u", "CONV00 = 3u", check_current_registers),
+        (PLAIN, HARDWARE, "CONV00 = DZ_BOARD_COMMAND", "CONV00 = 3u", check_current_registers),
         (PLAIN, HARDWARE, "TZA = TZ_FORCE_LO", "TZA = TZ_FORCE_HI", of_current("start")),
         (PLAIN, "dz_hardware.h", "DZ_CURRENT_REST_TICKS 97u", "DZ_CURRENT_REST_TICKS 1u", of_current("start")),
         (PLAIN, HARDWARE, "        AdcRegs.ADCST.bit.INT_SEQ2_CLR = 1u;", "", of_current("faults")),
-        (PLAIN, HARDWARE, "TZSEL.bit.OSHT2 = TZ_ENABLE", "TZSEL.bit.OSHT2 = 0u", of_current("faults")),
-        (PLAIN, HARDWARE, " && (GpioDataRegs.GPADAT.bit.GPIO13 != 0u)", "", of_current("closed_comparator")),
+        (PLAIN, HARDWARE, "TZSEL.bit.DZ_OVER_CURRENT_ONE_SHOT = TZ_ENABLE", "TZSEL.bit.DZ_OVER_CURRENT_ONE_SHOT = 0u", of_current("faults")),
+        (PLAIN, HARDWARE, " && (GpioDataRegs.GPADAT.bit.DZ_OVER_CURRENT_PIN != 0u)", "", of_current("closed_comparator")),
     ],
 )  # fmt: skip
 def test_a_seeded_fault_is_caught(form, file, old, new, check):
@@ -254,11 +256,11 @@ def test_numbers_follow_from_the_engineering_quantities():
     assert int(context["cmpb"]) == 150 * 20 == 3_000
     assert (context["wdflag_ms"], context["wdrst_us"]) == ("1.11", "17"), "(4 x 8192 + 512) and 512 periods of 30 MHz"
     assert TARGET.compare_max == 60_000 and TARGET.converter.code_max == 4_095
-    assert (context["adcclk_mhz"], context["sequence_us"]) == ("12.5", "4.52")
-    assert context["held_us"] == "1.48", "2.5 + 16 periods of 80 ns"
-    # 400 - 1.48; 400 more less one count of 1/150 us; 400 more
+    assert (context["adcclk_mhz"], context["sequence_us"]) == ("12.5", "5.88")
+    assert context["held_us"] == "2.84", "2.5 + 16 periods of 80 ns, and 17 of the conversion that is not used"
+    # 400 - 2.84; 400 more less one count of 1/150 us; 400 more
     delays = [context[f"delay_to_{key}_us"] for key in ("period", "edge", "last_edge")]
-    assert delays == ["398.52", "798.513", "1198.513"]
+    assert delays == ["397.16", "797.153", "1197.153"]
     assert (context["brr"], context["baud_real"], context["baud_error"]) == ("80", "115741", "+0.47")
     assert context["soca_prescale"] == "ET_2ND"
 

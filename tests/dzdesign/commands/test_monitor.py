@@ -32,7 +32,9 @@ from dzdesign.core.documents import sha256_of, to_json
 from dzdesign.core.errors import InputError
 from dzdesign.identify.reading.ramp_files import read_ramp_file
 from dzdesign.serial_port import open_port
-from tests.support.f28335_device import COMPILER, HERE, needs_compiler
+from dzdesign.verify.toolchain.host_compiler import host_compiler
+from tests.support.c2000_devices import DRIVERS
+from tests.support.synthetic import needs_compiler
 
 pytestmark = [
     needs_compiler,
@@ -110,8 +112,8 @@ class Bench:
 @pytest.fixture
 def bench(firmware_folder, tmp_path):
     device = tmp_path / "device"
-    sources = [str(firmware_folder / "f28335" / "dz_frame.c"), str(HERE / "frames.c")]
-    subprocess.run([COMPILER, "-std=c99", f"-I{firmware_folder / 'f28335'}", *sources, "-o", device], check=True)
+    sources = [str(firmware_folder / "f28335" / "dz_frame.c"), str(DRIVERS / "frames.c")]
+    subprocess.run([host_compiler(), "-std=c99", f"-I{firmware_folder / 'f28335'}", *sources, "-o", device], check=True)
     place = tmp_path / "recordings"
     place.mkdir()
     master, slave = os.openpty()

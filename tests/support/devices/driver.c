@@ -255,6 +255,9 @@ int main(int count, char **words)
     const char start = (count > 3) ? words[3][0] : ' ';
 
     device_power_up(start == 'W', start == 'C');
+#if defined(F28335) || defined(DZ_CURRENT_REST_TICKS)
+    pwms[1].starts_at = 1234u; /* the first module puts it in step */
+#endif
 #ifdef F28335
     if ((count > 2) && (strcmp(words[1], "registers") == 0))
     {

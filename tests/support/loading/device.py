@@ -9,12 +9,13 @@ from dzdesign.codegen.calibration.files import block_core_files
 from dzdesign.codegen.f28335.target import TARGET
 from dzdesign.codegen.project import target_files
 from tests.support.core_texts import texts
-from tests.support.f28335_device import HERE as DEVICE
+from tests.support.c2000_devices import model_of, model_options
 from tests.support.loading.bench import HERE
 from tests.support.loading.files import COMPILER, DIGEST, compensator, drive_files
 
 PERIOD_S = 1 / TARGET.tick_Hz
-SOURCES = ("dz_hardware.c", "dz_isr.c", "dz_telemetry.c", "dz_frame.c", "dz_active.c", "dz_calibration.c", "dz_store.c")
+SOURCES = ("dz_hardware.c", "dz_isr.c", "dz_telemetry.c", "dz_frame.c", "dz_active.c", "dz_calibration.c", "dz_store.c",
+           "dz_user.c")  # fmt: skip
 LOADING = ("dz_load.c", "dz_load_frame.c", "dz_slots.c")
 
 
@@ -36,10 +37,9 @@ def build_device(files: dict[str, str], folder: Path) -> Path:
     program = folder / "on_device"
     sources = [folder / name for name in (*SOURCES, *LOADING)]
     core = [folder / name for name in ("dz_comp.c", "dz_drive.c") if name in files]
-    sources += [*core, DEVICE / "device.c", DEVICE / "current.c", HERE / "on_device.c"]
-    command = [COMPILER, "-std=c99", "-Wall", "-Wextra", "-Werror", "-DDEVICE_WITHOUT_CORE"]
-    command += ["-DREAL_CORE"] if core else []
-    command += [f"-I{folder}", f"-I{DEVICE}", *map(str, sources), "-lm", "-o", str(program)]
+    sources += [*core, *model_of("f28335"), HERE / "on_device.c"]
+    command = [COMPILER, "-std=c99", "-Wall", "-Wextra", "-Werror", *(["-DREAL_CORE"] if core else [])]
+    command += [*model_options("f28335", folder), *map(str, sources), "-lm", "-o", str(program)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return program

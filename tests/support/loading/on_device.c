@@ -9,13 +9,14 @@
  *   send HEX      octets for the receiver, five a period at most
  *
  * Each line is answered by one: `key=number` for what is of interest, and `line=HEX`, what was transmitted since. */
-#include <setjmp.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "device.h"
+#include "DSP28x_Project.h"
 #include "dz_drive.h"
+#include "periods.h"
+#include "serial.h"
 
 #define main firmware_main
 #include "main.c"
@@ -29,13 +30,8 @@
 
 struct dz_calibration dz_block;
 
-static jmp_buf out_of_main;
 static uint8_t queue[QUEUE];
-static unsigned queued, services, wrong_reads;
-
-static void leave(void) { longjmp(out_of_main, 1); }
-
-static void count_service(void) { services++; }
+static unsigned queued, wrong_reads, turns;
 
 #ifndef REAL_CORE
 /* The drive follows its block's serial number, its ramp can be seen but does nothing, and is never asked while no block may be read. */
@@ -108,6 +104,19 @@ static unsigned take_hex(const char *text, uint8_t *octets, unsigned most)
     return count;
 }
 
+static void turn(void)
+{
+    if ((queued > 0u) && (turns % TURNS < OCTETS_A_PERIOD))
+    {
+        serial_receive(0u, queue[0]);
+        queued--;
+        memmove(queue, queue + 1, queued);
+    }
+    turns++;
+    service_watchdog_if_isr_ran();
+    dz_telemetry_poll();
+}
+
 static struct tick run(unsigned periods)
 {
     struct tick tick;
@@ -115,19 +124,7 @@ static struct tick run(unsigned periods)
     memset(&tick, 0, sizeof tick);
     for (unsigned period = 0u; period < periods; period++)
     {
-        tick = device_period('.');
-        for (unsigned turn = 0u; turn < TURNS; turn++)
-        {
-            if ((queued > 0u) && (turn < OCTETS_A_PERIOD))
-            {
-                device_receive(queue[0]);
-                queued--;
-                memmove(queue, queue + 1, queued);
-            }
-            service_watchdog_if_isr_ran();
-            dz_telemetry_poll();
-            device_transmit((EPwm1Regs.TBPRD + 1u) / TURNS);
-        }
+        tick = device_period('.', TURNS, turn);
     }
     return tick;
 }
@@ -137,8 +134,8 @@ static void answer(const struct tick *tick)
     printf("answer duty=%u duty_b=%u released=%u held=%u fault=%u ticks=%u used=%u block=%d queued=%u missed=%u "
            "lost=%u errors=%u services=%u wrong_reads=%u ost=%u dropped=%u line=",
            tick->duty, tick->duty_b, dz_state.released, dz_state.held, dz_state.fault, dz_state.ticks, dz_load.used,
-           (dz_active == NULL) ? -1 : (int)(dz_active->serial[1] >> 8), queued, device_octets_missed, device_line_lost,
-           dz_telemetry.line_errors, services, wrong_reads, EPwm1Regs.TZFLG.bit.OST, dz_telemetry.dropped);
+           (dz_active == NULL) ? -1 : (int)(dz_active->serial[1] >> 8), queued, serial_missed, serial_lost,
+           dz_telemetry.line_errors, device_services, wrong_reads, EPwm1Regs.TZFLG.bit.OST, dz_telemetry.dropped);
     for (unsigned i = 0u; i < device_line_count; i++)
     {
         printf("%02X", device_line[i]);
@@ -154,7 +151,7 @@ int main(void)
     struct tick tick;
 
     memset(&tick, 0, sizeof tick);
-    device_power_up();
+    device_power_up(false, false);
     while (fgets(line, sizeof line, stdin) != NULL)
     {
         const char *const rest = (strchr(line, ' ') != NULL) ? strchr(line, ' ') + 1 : line;
@@ -165,12 +162,7 @@ int main(void)
         }
         else if (strncmp(line, "start", 5) == 0)
         {
-            device_on_eint = leave;
-            if (setjmp(out_of_main) == 0)
-            {
-                (void)firmware_main();
-            }
-            device_on_service = count_service;
+            device_start();
         }
         else if (strncmp(line, "command", 7) == 0)
         {
@@ -178,11 +170,11 @@ int main(void)
         }
         else if (strncmp(line, "trip", 4) == 0)
         {
-            tick = device_period((atoi(rest) != 0) ? 'T' : 't');
+            tick = device_period((atoi(rest) != 0) ? 'T' : 't', 1u, NULL);
         }
         else if (strncmp(line, "break", 5) == 0)
         {
-            device_break();
+            serial_break(0u);
         }
         else if (strncmp(line, "send", 4) == 0)
         {

@@ -189,7 +189,7 @@ void settle(void)
 
     settle_registers();
     signals = trip_signals();
-    for (unsigned module = 0u; module < MODULES; module++)
+    for (unsigned module = MODULES; module-- > 0u;) /* what a module keeps in step starts before it */
     {
         struct pwm *const pwm = &pwms[module];
         const bool counted = pwm->counts;
@@ -199,9 +199,9 @@ void settle(void)
         pwm->counts = counters_run && (pwm->counting != STOPPED);
         if (pwm->counts && !counted)
         {
-            pwm->begun = now;
+            pwm->begun = now - (int64_t)pwm->starts_at * pwm->divider;
             load(pwm, true);
-            arrive(module, 0u);
+            arrive(module, pwm->starts_at);
         }
     }
     settle_registers();

@@ -35,6 +35,7 @@ struct pwm
     /* The module itself. */
     uint32_t active_period, active_compare, active_force, at;
     int64_t begun; /* when its counter was 0 */
+    uint32_t starts_at;
     bool counts, tripped, set, interrupt_flag, interrupt_waits;
 };
 
