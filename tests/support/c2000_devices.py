@@ -1,4 +1,4 @@
-"""The generated firmware of both C2000 boards on the models of the devices that `verify` has, with a core that tells more.
+"""The generated firmware of both C2000 boards on the device models of `verify`, with a core that tells more.
 
 A form of it is compiled once in a session; of a seeded fault only the file that it is in.
 """

@@ -211,10 +211,12 @@ def test_start_up_order_and_watchdog():
         (ONE, HARDWARE, "    EALLOW;\n    DZ_PWM_A.HRCNFG", "    DZ_PWM_A.HRCNFG", check_left_behind),
         (ONE, "dz_telemetry.c", "LOSPCP.all = DZ_SCI_LOSPCP", "LOSPCP.all = 2u", check_registers),
         (ONE, "dz_telemetry.c", "    EALLOW;\n    SysCtrlRegs", "    SysCtrlRegs", check_registers),
-        (ONE, "dz_telemetry.c", "DZ_SCI_MUX.bit.DZ_SCI_TX = DZ_SCI_FUNCTION", "DZ_SCI_MUX.bit.DZ_SCI_TX = 2u", check_registers),
+        (ONE, "dz_telemetry.c", "DZ_SCI_MUX.bit.DZ_SCI_TX = DZ_SCI_FUNCTION", "DZ_SCI_MUX.bit.DZ_SCI_TX = 2u",
+         check_registers),
         (TWO, HARDWARE, "DZ_PWM_B.TZFRC.bit.OST = 1u;", "", check_second_registers),
         (TWO, HARDWARE, "DZ_PWM_B.TZCTL.bit.TZA = TZ_FORCE_LO", "DZ_PWM_B.TZCTL.bit.TZA = 0u", check_both_outputs),
-        (TWO, HARDWARE, "DZ_PWM_B.TZSEL.bit.DZ_TRIP_ONE_SHOT = TZ_ENABLE", "DZ_PWM_B.TZSEL.all = 0u", check_second_registers),
+        (TWO, HARDWARE, "DZ_PWM_B.TZSEL.bit.DZ_TRIP_ONE_SHOT = TZ_ENABLE", "DZ_PWM_B.TZSEL.all = 0u",
+         check_second_registers),
         (TWO, HARDWARE, "DZ_PWM_B.TBCTL.bit.PHSEN = TB_ENABLE;", "", check_both_outputs),
         (TWO, HARDWARE, "DZ_PWM_B.TZFRC.bit.OST = 1u;\n    EDIS;\n}\n\nvoid dz_un", "EDIS;\n}\n\nvoid dz_un",
          check_second_missing_samples),
@@ -240,8 +242,10 @@ def test_start_up_order_and_watchdog():
         (PLAIN, HARDWARE, "TZA = TZ_FORCE_LO", "TZA = TZ_FORCE_HI", of_current("start")),
         (PLAIN, "dz_hardware.h", "DZ_CURRENT_REST_TICKS 97u", "DZ_CURRENT_REST_TICKS 1u", of_current("start")),
         (PLAIN, HARDWARE, "        AdcRegs.ADCST.bit.INT_SEQ2_CLR = 1u;", "", of_current("faults")),
-        (PLAIN, HARDWARE, "TZSEL.bit.DZ_OVER_CURRENT_ONE_SHOT = TZ_ENABLE", "TZSEL.bit.DZ_OVER_CURRENT_ONE_SHOT = 0u", of_current("faults")),
-        (PLAIN, HARDWARE, " && (GpioDataRegs.GPADAT.bit.DZ_OVER_CURRENT_PIN != 0u)", "", of_current("closed_comparator")),
+        (PLAIN, HARDWARE, "TZSEL.bit.DZ_OVER_CURRENT_ONE_SHOT = TZ_ENABLE",
+         "TZSEL.bit.DZ_OVER_CURRENT_ONE_SHOT = 0u", of_current("faults")),
+        (PLAIN, HARDWARE, " && (GpioDataRegs.GPADAT.bit.DZ_OVER_CURRENT_PIN != 0u)", "",
+         of_current("closed_comparator")),
     ],
 )  # fmt: skip
 def test_a_seeded_fault_is_caught(form, file, old, new, check):
@@ -257,7 +261,7 @@ def test_numbers_follow_from_the_engineering_quantities():
     assert (context["wdflag_ms"], context["wdrst_us"]) == ("1.11", "17"), "(4 x 8192 + 512) and 512 periods of 30 MHz"
     assert TARGET.compare_max == 60_000 and TARGET.converter.code_max == 4_095
     assert (context["adcclk_mhz"], context["sequence_us"]) == ("12.5", "5.88")
-    assert context["held_us"] == "2.84", "2.5 + 16 periods of 80 ns, and 17 of the conversion that is not used"
+    assert context["held_us"] == "2.84", "2.5 + 16 periods of 80 ns, and 17 of what is not used"
     # 400 - 2.84; 400 more less one count of 1/150 us; 400 more
     delays = [context[f"delay_to_{key}_us"] for key in ("period", "edge", "last_edge")]
     assert delays == ["397.16", "797.153", "1197.153"]

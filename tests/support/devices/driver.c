@@ -177,6 +177,7 @@ static void turn(void)
 
 static void show_line(void)
 {
+    (void)SciaRegs.SCICTL1.all; /* an access has what was sent meanwhile leave */
     printf("line ");
     for (unsigned i = 0u; i < device_line_count; i++)
     {

@@ -8,8 +8,8 @@ from dzdesign.codegen.calibration.block import block_of, built_for
 from dzdesign.codegen.calibration.files import block_core_files
 from dzdesign.codegen.f28335.target import TARGET
 from dzdesign.codegen.project import target_files
-from tests.support.core_texts import texts
 from tests.support.c2000_devices import model_of, model_options
+from tests.support.core_texts import texts
 from tests.support.loading.bench import HERE
 from tests.support.loading.files import COMPILER, DIGEST, compensator, drive_files
 

@@ -16,7 +16,7 @@ from dzdesign.verify.hardware.model import Bench
 from tests.support.synthetic import needs_compiler
 
 DESIGNS = {"f28335": {}, "f280049c": {}, "f28335, declared": {"crystal": "20 MHz", "channels": "A5 B7 A0"}}
-USER_CODE = "#include <stdint.h>\n#include \"dz_user.h\"\nvoid other(void);\n"
+USER_CODE = '#include <stdint.h>\n#include "dz_user.h"\nvoid other(void);\n'
 
 
 @pytest.fixture(scope="module")
@@ -99,8 +99,10 @@ def test_a_board_that_does_not_is_named(folder_of, case):
 
 def test_a_project_that_ccs_builds_in_place_is_no_foreign_code(folder_of):
     folder = folder_of("f28335")
-    for name in ("Debug/makefile", "f28335/RAM/subdir_rules.mk", "f28335/FLASH/dz_hardware.obj", ".project", ".cproject",
-                 "f28335/.ccsproject", "targetConfigs/TMS320F28335.ccxml", ".settings/org.prefs", "f28335/build_RAM/a.asm"):  # fmt: skip
+    for name in ("Debug/makefile", "f28335/RAM/subdir_rules.mk", "f28335/FLASH/dz_hardware.obj", ".project",
+     ".cproject",
+                 "f28335/.ccsproject", "targetConfigs/TMS320F28335.ccxml", ".settings/org.prefs",
+                  "f28335/build_RAM/a.asm"):  # fmt: skip
         (folder / name).parent.mkdir(exist_ok=True)
         (folder / name).write_text("made by CCS")
     assert reproduced(folder, regenerated(folder)).holds
@@ -117,7 +119,9 @@ def test_code_of_the_user_runs_where_that_is_asked_for(folder_of):
         '#include "dz_user.h"\nvoid other(void);\nvoid dz_user_init(void) {}\nvoid dz_user_poll(void) { other(); }\n'
     )
     assert found_in(folder) == {} and found_in(folder, with_code=True) == {}
-    (folder / "board/other.c").write_text('#include "driverlib.h"\nvoid other(void) { EPWM_clearTripZoneFlag(EPWM1_BASE, 4u); }\n')
+    (folder / "board/other.c").write_text(
+        '#include "driverlib.h"\nvoid other(void) { EPWM_clearTripZoneFlag(EPWM1_BASE, 4u); }\n'
+    )
     assert found_in(folder) == {}, "of code that is not run nothing is known"
     assert {"hardware-trip", "hardware-start"} <= found_in(folder, with_code=True).keys()
     (folder / "board/other.c").write_text("void other(void) { for (;;) { } }\n")
@@ -143,7 +147,7 @@ def test_verify_says_what_of_the_board_it_did_not_try(folder_of):
 
 def test_the_option_is_for_a_device_that_is_modelled(example_valve, tmp_path):
     api.generate(api.design(example_valve, target="cortex-m4"), output=tmp_path / "fw")
-    with pytest.raises(InputError, match="--board-code"):
+    with pytest.raises(InputError, match="board_code"):
         api.verify(tmp_path / "fw", board_code=True)
 
 

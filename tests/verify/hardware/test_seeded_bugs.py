@@ -40,7 +40,6 @@ def found_of(folder, target, form=ONE, edit=None, calibration="fixed", **board):
         assert old in texts[name], f"{old!r} is not in {name}"
         texts[name] = texts[name].replace(old, new)
     write(folder, texts)
-    (folder / "manifest.json").write_bytes(made.contents["manifest.json"] if "manifest.json" in made.contents else b"")
     values = read_board_values(texts[f"{target}/dz_board.h"])
     assert values is not None and board.keys() <= values.keys()
     bench = lambda: Bench(folder, made.manifest, compensator, Board(values={**values, **board}))  # noqa: E731
@@ -50,16 +49,21 @@ def found_of(folder, target, form=ONE, edit=None, calibration="fixed", **board):
 #: Form, file, what stands there, what somebody wrote instead, and the requirement that names it.
 BUGS = {
     "f28335": {
-        "pressures swapped": (ONE, HARDWARE, "codes[1] = AdcMirror.ADCRESULT2", "codes[1] = AdcMirror.ADCRESULT3", "channels"),
+        "pressures swapped": (ONE, HARDWARE, "codes[1] = AdcMirror.ADCRESULT2", "codes[1] = AdcMirror.ADCRESULT3",
+                              "channels"),
         "left-justified result": (ONE, HARDWARE, "AdcMirror.", "AdcRegs.", "channels"),
-        "sequencer not reset": (ONE, HARDWARE, "        AdcRegs.ADCTRL2.bit.RST_SEQ1 = 1u;\n        fin", "        fin", "channels"),
-        "first conversion used": (ONE, HARDWARE, "codes[0] = AdcMirror.ADCRESULT1", "codes[0] = AdcMirror.ADCRESULT0", "channels"),
+        "sequencer not reset": (ONE, HARDWARE, "        AdcRegs.ADCTRL2.bit.RST_SEQ1 = 1u;\n        fin",
+                                "        fin", "channels"),
+        "first conversion used": (ONE, HARDWARE, "codes[0] = AdcMirror.ADCRESULT1",
+                                  "codes[0] = AdcMirror.ADCRESULT0", "channels"),
         "watchdog missing": (ONE, HARDWARE, "    SysCtrlRegs.WDCR = DZ_WDCR_ENABLE;\n", "", "watchdog"),
         "watchdog interrupts": (ONE, HARDWARE, "SysCtrlRegs.SCSR = 0x0000u", "SysCtrlRegs.SCSR = 0x0002u", "watchdog"),
         "trip drives fully": (ONE, HARDWARE, "TZ_FORCE_LO", "TZ_FORCE_HI", "trip"),
-        "trip input not selected": (ONE, HARDWARE, "    DZ_PWM_A.TZSEL.bit.DZ_TRIP", "    if (0) DZ_PWM_A.TZSEL.bit.DZ_TRIP", "trip"),
+        "trip input not selected": (ONE, HARDWARE, "    DZ_PWM_A.TZSEL.bit.DZ_TRIP",
+                                    "    if (0) DZ_PWM_A.TZSEL.bit.DZ_TRIP", "trip"),
         "trip inverted": (ONE, HARDWARE, "DZ_TRIP_PIN != 0u)", "DZ_TRIP_PIN == 0u)", "trip"),
-        "no force at compare 0": (ONE, HARDWARE, "(compare == 0u) ? DZ_FORCE_LOW : DZ_FORCE_NONE", "DZ_FORCE_NONE", "pwm"),
+        "no force at compare 0": (ONE, HARDWARE, "(compare == 0u) ? DZ_FORCE_LOW : DZ_FORCE_NONE", "DZ_FORCE_NONE",
+                                  "pwm"),
         "half the period": (ONE, HARDWARE, "TBPRD = DZ_PWM_TBPRD", "TBPRD = DZ_PWM_TBPRD / 2u", "pwm"),
         "polarity": (ONE, HARDWARE, "ZRO = AQ_SET;", "ZRO = AQ_CLEAR; DZ_PWM_A.AQCTLA.bit.PRD = AQ_SET;", "pwm"),
         "another pin": (ONE, HARDWARE, "GPAMUX1.bit.DZ_PWM_PIN = 1u", "GPAMUX1.bit.GPIO4 = 1u", "pwm"),
@@ -72,23 +76,27 @@ BUGS = {
         "samples too often": (ONE, HARDWARE, "SOCAPRD = ET_2ND", "SOCAPRD = ET_1ST", "rates"),
         "both solenoids": (TWO, HARDWARE, "DZ_PWM_B.CMPA.half.CMPA = compare;\n    DZ_PWM_B.AQCSFRC",
                            "DZ_PWM_B.CMPA.half.CMPA = compare + 9u;\n    if (compare) DZ_PWM_B.AQCSFRC", "solenoids"),
-        "B for A": (TWO, ISR, "dz_write_compare_b(drive.compare_b)", "dz_write_compare_b(drive.compare_a)", "solenoids"),
+        "B for A": (TWO, ISR, "dz_write_compare_b(drive.compare_b)", "dz_write_compare_b(drive.compare_a)",
+                    "solenoids"),
         "current too early": (CURRENT, HARDWARE, "CMPA.half.CMPA = DZ_CURRENT_START", "CMPA.half.CMPA = 0u", "current"),
         "current of another channel": (CURRENT, "dz_hardware.h", "(DZ_BOARD_CURRENT * 0x1111u)", "0x3332u", "channels"),
-        "comparator not selected": (SUPPLY, HARDWARE, "    DZ_PWM_A.TZSEL.bit.DZ_OVER", "    if (0) DZ_PWM_A.TZSEL.bit.DZ_OVER", "trip"),
+        "comparator not selected": (SUPPLY, HARDWARE, "    DZ_PWM_A.TZSEL.bit.DZ_OVER",
+                                    "    if (0) DZ_PWM_A.TZSEL.bit.DZ_OVER", "trip"),
     },
     "f280049c": {
         "pressures swapped": (ONE, HARDWARE, "codes[1] = ADC_readResult(ADCARESULT_BASE, ADC_SOC_NUMBER2)",
                               "codes[1] = ADC_readResult(ADCARESULT_BASE, ADC_SOC_NUMBER3)", "channels"),
         "converter not awaited": (ONE, HARDWARE, "DEVICE_DELAY_US(1000);", "", "channels"),
-        "X-BAR on another pin": (ONE, HARDWARE, "XBAR_INPUT1, DZ_BOARD_TRIP_GPIO", "XBAR_INPUT1, DZ_BOARD_TRIP_GPIO + 1", "trip"),
+        "X-BAR on another pin": (ONE, HARDWARE, "XBAR_INPUT1, DZ_BOARD_TRIP_GPIO",
+                                 "XBAR_INPUT1, DZ_BOARD_TRIP_GPIO + 1", "trip"),
         "trip drives fully": (ONE, HARDWARE, "TZA, EPWM_TZ_ACTION_LOW", "TZA, EPWM_TZ_ACTION_HIGH", "trip"),
         "clock halved": (ONE, HARDWARE, "EPWM_CLOCK_DIVIDER_1", "EPWM_CLOCK_DIVIDER_2", "pwm"),
         "counts up and down": (ONE, HARDWARE, "EPWM_COUNTER_MODE_UP", "EPWM_COUNTER_MODE_UP_DOWN", "pwm"),
         "no force at compare 0": (ONE, HARDWARE, "(compare == 0u) ? EPWM_AQ_SW_OUTPUT_LOW : EPWM_AQ_SW_DISABLED",
                                   "EPWM_AQ_SW_DISABLED", "pwm"),
         "watchdog not started": (ONE, HARDWARE, "    SysCtl_enableWatchdog();\n", "", "watchdog"),
-        "watchdog served by the loop": (ONE, MAIN, "if (ticks != ticks_seen)", "if ((ticks != ticks_seen) || (ticks_seen < 65535u))", "watchdog"),
+        "watchdog served by the loop": (ONE, MAIN, "if (ticks != ticks_seen)",
+            "if ((ticks != ticks_seen) || (ticks_seen < 65535u))", "watchdog"),
         "samples too often": (ONE, HARDWARE, "EPWM_SOC_A, DZ_TICKS_PER_SAMPLE", "EPWM_SOC_A, 1u", "rates"),
         "enumerations swapped": (ONE, HARDWARE, "EPWM_TZ_ACTION_EVENT_TZA, EPWM_TZ_ACTION_LOW",
                                  "EPWM_TZ_ACTION_LOW, EPWM_TZ_ACTION_EVENT_TZA", "compiles"),

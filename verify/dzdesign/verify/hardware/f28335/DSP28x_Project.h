@@ -153,6 +153,8 @@ struct SCI_REGS
     REGISTER(SCIFFCT, uint16_t FFTXDLY : 8; uint16_t rsvd1 : 5; uint16_t CDC : 1; uint16_t ABDCLR : 1; uint16_t ABD : 1;);
 };
 
+extern volatile struct SCI_REGS device_plain_sci; /* for a program without the model */
+
 struct SYS_CTRL_REGS
 {
     REGISTER(PLLSTS, uint16_t PLLLOCKS : 1; uint16_t rsvd1 : 1; uint16_t PLLOFF : 1; uint16_t MCLKSTS : 1;
@@ -241,7 +243,9 @@ extern volatile struct PIE_CTRL_REGS PieCtrlRegs;
 extern volatile struct PIE_VECT_TABLE PieVectTable;
 extern volatile unsigned int IER, IFR;
 /* Every access goes through the model: a write to SCITXBUF moves an octet, TXFFST counts those that wait. */
+#ifndef SciaRegs
 #define SciaRegs (*device_sci(0u))
+#endif
 #define ScibRegs (*device_sci(1u))
 #define ScicRegs (*device_sci(2u))
 volatile struct SCI_REGS *device_sci(unsigned line);
