@@ -74,6 +74,8 @@ BUGS = {
         "samples lost unseen": (ONE, ISR, "dz_state.fault |= DZ_FAULT_NO_SAMPLE;", "", "sample-loss"),
         "not acknowledged": (ONE, HARDWARE, "PieCtrlRegs.PIEACK.all = PIEACK_GROUP3;", "", "rates"),
         "samples too often": (ONE, HARDWARE, "SOCAPRD = ET_2ND", "SOCAPRD = ET_1ST", "rates"),
+        "telemetry on no pin": (ONE, "dz_telemetry.c", "DZ_SCI_MUX.bit.DZ_SCI_TX = DZ_SCI_FUNCTION",
+                                "DZ_SCI_MUX.bit.DZ_SCI_TX = 0u", "rates"),
         "both solenoids": (TWO, HARDWARE, "DZ_PWM_B.CMPA.half.CMPA = compare;\n    DZ_PWM_B.AQCSFRC",
                            "DZ_PWM_B.CMPA.half.CMPA = compare + 9u;\n    if (compare) DZ_PWM_B.AQCSFRC", "solenoids"),
         "B for A": (TWO, ISR, "dz_write_compare_b(drive.compare_b)", "dz_write_compare_b(drive.compare_a)",

@@ -294,7 +294,8 @@ def _trips(runs: HardwareRuns) -> str:
 
 
 def _loses_samples(runs: HardwareRuns) -> str:
-    lost = {"samples were lost": INPUTS, "codes of the current were lost": ("CURRENT",)}
+    sampled = [role for role in runs.bench.channels if role != "CURRENT"]
+    lost = {"samples were lost": sampled, "codes of the current were lost": ["CURRENT"]}
     for cause, roles in lost.items():
         if "CURRENT" in roles and runs.drive is None:
             continue
@@ -338,6 +339,9 @@ def _at_its_rate(runs: HardwareRuns) -> str:
     if {Fraction(trace.clock_Hz, counts) for counts in apart} != {Fraction(signals.sample_Hz)}:
         rates = ", ".join(f"{trace.clock_Hz / counts:.1f}" for counts in sorted(apart)[:3])
         return f"samples come at {rates or 0} Hz, expected {signals.sample_Hz} Hz"
+    transmits, sent = runs.bench.board.get("SCI_TX_GPIO"), {each.one for each in trace.events if each.word == "octet"}
+    if transmits is not None and sent != {transmits}:
+        return f"the telemetry does not leave on GPIO{transmits}"
     return ""
 
 
