@@ -1,0 +1,48 @@
+"""The printed limit of a position loop's gain against a simulation in small steps, over draws of valve and loop."""
+
+import numpy as np
+from scoreboard import Row, print_rows, say
+
+from dzdesign.design.costs_at_tests import LawCorners
+from dzdesign.design.position_loop import GAINS, Swinging, largest_gain
+from tests.support.hunting import Drawn, drawn, hunts
+
+DRAWS, FEW = 200, 12
+BELOW, ABOVE = 0.95, 1.15
+
+
+def swinging(of: Drawn) -> Swinging:
+    """Return a draw as the product takes it."""
+    law = LawCorners(
+        offset=of.offset, at_end=of.at_end, full=of.full, zero_band=of.zero_band, end=of.end, leaves=of.leaves
+    )
+    return Swinging(lag_s=of.lag_s, delay_s=of.delay_s, sample_Hz=1250, law=law, opens=of.opens, closes=of.closes)
+
+
+def print_hunting(*, quick: bool, seed: int) -> list[Row]:
+    """Print how many loops cycle just below the limit, and how many do not just above."""
+    rng, draws = np.random.default_rng(seed), FEW if quick else DRAWS
+    below = quiet = limited = 0
+    ratios = []
+    for draw in range(draws):
+        of = drawn(rng)
+        loop = swinging(of)
+        gain = largest_gain(loop)
+        ratios.append(gain / loop.linear_gain)
+        if not 0 < gain < GAINS[-1] * loop.linear_gain:
+            continue
+        limited += 1
+        seconds = 40 * 2 * np.pi / loop.swing_rad_s
+        below += hunts(of, BELOW * gain, seconds)
+        quiet += not hunts(of, ABOVE * gain, seconds)
+        if not (draw + 1) % 20:
+            say(f"position loops: {draw + 1} of {draws}")
+    rows = [
+        Row("loops that cycle at 95 % of the printed limit", below, 0, f"of {limited}"),
+        Row("loops that do not cycle at 115 % of it", quiet, 0.2 * limited, f"of {limited}"),
+        Row("draws without a limit within what is tried", draws - limited),
+        Row("printed limit over that of an ideal line, median", float(np.median(ratios))),
+        Row("the same, smallest", float(np.min(ratios))),
+    ]
+    print_rows(f"Hunting, {draws} draws, seed {seed}", rows)
+    return rows
