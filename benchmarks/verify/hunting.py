@@ -3,20 +3,11 @@
 import numpy as np
 from scoreboard import Row, print_rows, say
 
-from dzdesign.design.costs_at_tests import LawCorners
-from dzdesign.design.position_loop import GAINS, Swinging, largest_gain
-from tests.support.hunting import Drawn, drawn, hunts
+from dzdesign.design.position_loop import GAINS, largest_gain
+from tests.support.hunting import drawn, hunts, swinging
 
 DRAWS, FEW = 200, 12
 BELOW, ABOVE = 0.95, 1.15
-
-
-def swinging(of: Drawn) -> Swinging:
-    """Return a draw as the product takes it."""
-    law = LawCorners(
-        offset=of.offset, at_end=of.at_end, full=of.full, zero_band=of.zero_band, end=of.end, leaves=of.leaves
-    )
-    return Swinging(lag_s=of.lag_s, delay_s=of.delay_s, sample_Hz=1250, law=law, opens=of.opens, closes=of.closes)
 
 
 def print_hunting(*, quick: bool, seed: int) -> list[Row]:

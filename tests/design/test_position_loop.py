@@ -6,20 +6,10 @@ import numpy as np
 import pytest
 
 from dzdesign.core.errors import InputError
-from dzdesign.design.costs_at_tests import LawCorners
 from dzdesign.design.design_choices import position_loop
-from dzdesign.design.position_loop import GAINS, Swinging, in_words, largest_gain, largest_gains
+from dzdesign.design.position_loop import GAINS, in_words, largest_gain, largest_gains
 from tests.support.designs import designed
-from tests.support.hunting import Drawn, drawn, hunts
-
-
-def swinging(of: Drawn) -> Swinging:
-    law = LawCorners(
-        offset=of.offset, at_end=of.at_end, full=of.full, zero_band=of.zero_band, end=of.end, leaves=of.leaves
-    )
-    return Swinging(
-        lag_s=of.lag_s, delay_s=of.delay_s, sample_Hz=1250, law=law, opens=of.opens, closes=of.closes
-    )  # fmt: skip
+from tests.support.hunting import drawn, hunts, swinging
 
 
 @pytest.mark.parametrize("seed", range(4))

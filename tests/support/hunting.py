@@ -1,8 +1,11 @@
-"""A position loop around a valve, advanced in small steps: shares no code with what `design` states of it."""
+"""A position loop around a valve, advanced in small steps: `hunts` shares no code with what `design` states of it."""
 
 from dataclasses import dataclass
 
 import numpy as np
+
+from dzdesign.design.costs_at_tests import LawCorners
+from dzdesign.design.position_loop import Swinging
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,6 +40,14 @@ def drawn(rng: np.random.Generator) -> Drawn:
         opens=float(opens),
         closes=float(opens - width),
     )
+
+
+def swinging(of: Drawn) -> Swinging:
+    """Return a draw as `design` takes it."""
+    law = LawCorners(
+        offset=of.offset, at_end=of.at_end, full=of.full, zero_band=of.zero_band, end=of.end, leaves=of.leaves
+    )
+    return Swinging(lag_s=of.lag_s, delay_s=of.delay_s, sample_Hz=1250, law=law, opens=of.opens, closes=of.closes)
 
 
 def hunts(of: Drawn, gain: float, seconds: float, fine: int = 5) -> bool:
