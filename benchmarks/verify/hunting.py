@@ -28,12 +28,13 @@ def print_hunting(*, quick: bool, seed: int) -> list[Row]:
         quiet += not hunts(of, ABOVE * gain, seconds)
         if not (draw + 1) % 20:
             say(f"position loops: {draw + 1} of {draws}")
+    note = f"of {limited}"
     rows = [
-        Row("loops that cycle at 95 % of the printed limit", below, 0, f"of {limited}"),
-        Row("loops that do not cycle at 115 % of it", quiet, 0.2 * limited, f"of {limited}"),
-        Row("draws without a limit within what is tried", draws - limited),
-        Row("printed limit over that of an ideal line, median", float(np.median(ratios))),
-        Row("the same, smallest", float(np.min(ratios))),
+        Row(what="loops that cycle at 95 % of the printed limit", value=below, limit=0, note=note),
+        Row(what="loops that do not cycle at 115 % of it", value=quiet, limit=0.2 * limited, note=note),
+        Row(what="draws without a limit within what is tried", value=draws - limited),
+        Row(what="printed limit over that of an ideal line, median", value=float(np.median(ratios))),
+        Row(what="the same, smallest", value=float(np.min(ratios))),
     ]
     print_rows(f"Hunting, {draws} draws, seed {seed}", rows)
     return rows
