@@ -17,6 +17,7 @@ from all_inputs import print_inputs  # noqa: E402
 from calibration_blocks import print_blocks  # noqa: E402
 from current_loop import print_current_loop  # noqa: E402
 from current_valve import print_current_valve  # noqa: E402
+from hunting import print_hunting  # noqa: E402
 from hysteresis import print_hysteresis  # noqa: E402
 from mutants import print_mutants  # noqa: E402
 from native_plant import print_native_plant  # noqa: E402
@@ -35,6 +36,7 @@ PARTS = {
     "current-valve": (print_current_valve, 0),
     "above": (print_above, 0),
     "blocks": (print_blocks, 24),
+    "hunting": (print_hunting, 505),
 }
 
 

@@ -45,6 +45,9 @@ DEGREES = r"[-+]?\d{1,6}(?:\.\d{0,9})?"
 TEMPERATURES = re.compile(
     rf"\s*(?P<low>{DEGREES})\s*(?:(?:\.\.|to)\s*(?P<high>{DEGREES})\s*)?(?P<unit>(?:deg|°)?\s?[CF])\s*", re.ASCII
 )
+#: Lag of a usual proportional valve, and delay of a loop that runs in the drive; shortest and longest that are tried.
+LOOP = "20 ms, 2 ms"
+SHORTEST_LAG_S, LONGEST_LAG_S = 1e-3, 1.0
 CHANNEL = re.compile(r"[A-D]\d{1,2}", re.ASCII)
 MOST_HZ = 150e6
 CODES = re.compile(r"\s*(\d{1,4})\s*\+\s*(\d{1,4})\s*\+\s*(\d{1,4})\s*codes?\s*", re.ASCII)
@@ -120,6 +123,20 @@ def _converter_errors(text: str, option: str) -> tuple[int, ...]:
             f"{option} is {quoted(text)}, expected offset, gain error and noise, such as '15 + 30 + 4 codes'"
         )
     return tuple(map(int, found.groups()))
+
+
+def position_loop(text: str, option: str) -> tuple[float, float]:
+    """Read the lag of a valve and the delay of a loop around it, s."""
+    parts = text.split(",")
+    if len(parts) != 2:
+        raise InputError(f"{option} is {quoted(text)}, expected a lag and a delay, such as '{LOOP}'")
+    lag, delay = (parse_quantity(part.strip(), "time", option) for part in parts)
+    if not SHORTEST_LAG_S <= lag <= LONGEST_LAG_S or not 0 <= delay <= LONGEST_LAG_S:
+        raise InputError(
+            f"{option} is {quoted(text)}, expected a lag of {SHORTEST_LAG_S * 1e3:g} ms to {LONGEST_LAG_S:g} s, and a "
+            f"delay of at most {LONGEST_LAG_S:g} s"
+        )
+    return lag, delay
 
 
 def _crystal(text: str, option: str) -> int:
@@ -233,6 +250,9 @@ class DesignChoices:
     reading_flow: Annotated[Text, Option("Q", LAW, example="0.6 L/min", read=_reading_flow)] = None
     """Flow at which dead zones are read, in addition to the onset (default: the meter's floor, or the noise level of a
     meter without one)."""
+    position_loop: Annotated[Text, Option("T", LAW, LOOP, example=LOOP, read=position_loop)] = None
+    """Lag of the valve and delay of a position loop around it, of which `design` states the largest gain that does not
+    hunt. Nothing of the firmware depends on it."""
     output_max: Annotated[Text, Option("C", LAW, "100 %", example="95 %", read=share(Fraction(1), or_zero=False))] = (
         None
     )

@@ -35,9 +35,12 @@ def _rational(value: "Fraction") -> str:
 
 def print_design(compensator: "Compensator") -> None:
     """Print a compensator, and what each way with the hysteresis would leave."""
+    from dzdesign.design.position_loop import in_words
     from dzdesign.design.redesign import hysteresis_choices, without_sensors
 
     print_compensator(compensator)
+    for line in in_words(compensator):
+        put_line(new_console(), line)
     read_at = compensator.valve.recorded_units.text(compensator.reading_flow_L_min, ".2f L/min")
     choices = hysteresis_choices(compensator)
     beside = (without_sensors(compensator), *choices) if choices else ()
