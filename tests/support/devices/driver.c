@@ -228,9 +228,9 @@ static void run_preempted(unsigned look)
     for (unsigned i = 0u; i < 3u; i++)
     {
         dz_telemetry_poll();
+        (void)SciaRegs.SCICTL1.all;
         delay(0.01); /* longer than a frame takes */
     }
-    dz_telemetry_poll();
     show_line();
 }
 
