@@ -97,6 +97,14 @@ def test_a_board_that_does_not_is_named(folder_of, case):
     assert f"hardware-{named}" in found, found
 
 
+@needs_compiler
+def test_a_value_that_is_gone_is_named(folder_of):
+    folder = folder_of("f280049c")
+    path = folder / "f280049c/dz_board.h"
+    path.write_text(re.sub(r"#ifndef DZ_BOARD_WINDOW\n.*\n#endif\n", "", path.read_text("utf-8")), encoding="utf-8")
+    assert "DZ_BOARD_WINDOW" in found_in(folder)["hardware-compiles"]
+
+
 def test_a_project_that_ccs_builds_in_place_is_no_foreign_code(folder_of):
     folder = folder_of("f28335")
     for name in ("Debug/makefile", "f28335/RAM/subdir_rules.mk", "f28335/FLASH/dz_hardware.obj", ".project",

@@ -6,7 +6,7 @@ An output other than a C firmware has a list of its own, in `outputs.verificatio
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from dzdesign.core.artefact_files import MANIFEST_NAME
 from dzdesign.core.artefact_types import THIS_TOOL, Artefact, SourceFile, as_document, schema_of, to_json_bytes
@@ -32,6 +32,7 @@ from dzdesign.verify.exhaustive.block_check import own_block_accepted
 from dzdesign.verify.exhaustive.drive_check import drive_follows
 from dzdesign.verify.exhaustive.machine_code import machine_code_checks
 from dzdesign.verify.folder import (
+    USER_FOLDER,
     Regenerated,
     as_generated,
     changed_board_files,
@@ -41,7 +42,7 @@ from dzdesign.verify.folder import (
     reproduced,
     user_files,
 )
-from dzdesign.verify.hardware.board_values import board_of
+from dzdesign.verify.hardware.board_values import BOARD_FILE, board_of
 from dzdesign.verify.hardware.checks import hardware_checks
 from dzdesign.verify.hardware.model import DEVICES, Bench
 from dzdesign.verify.requirements import EVERY_RUN, OF_SOME, Check, Requirement, Tried, checks_of
@@ -346,8 +347,14 @@ def untried_requirements(evidence: Evidence) -> tuple[Requirement, ...]:
     }
     for each in (each for row in REQUIREMENTS for each in row.requirements):
         if lacking.get(each, each.id not in tried and not each.how.startswith(OF_SOME)):
-            untried.append(replace(each, how=evidence.board_not_compiled) if each == needed.BOARD_FILES else each)
+            own = {needed.BOARD_FILES: evidence.board_not_compiled, needed.BOARD_CODE: _how_to_try(of_the_user)}
+            untried.append(replace(each, how=own.get(each) or each.how))
     return tuple(untried)
+
+
+def _how_to_try(of_the_user: Sequence[str]) -> str:
+    has_more = any(PurePosixPath(name).name == BOARD_FILE for name in of_the_user)
+    return f"keep values alone in {BOARD_FILE}, and your code in {USER_FOLDER}/" if has_more else ""
 
 
 def label_of_untried(requirement: Requirement) -> str:

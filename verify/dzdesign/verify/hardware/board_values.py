@@ -44,6 +44,8 @@ class Board:
     """The user's part of a firmware, as far as it is compiled and run."""
 
     values: Mapping[str, int]
+    #: Names that the generated dz_board.h has, and the user's has not.
+    lacking: tuple[str, ...] = ()
     #: The user's code to compile, by the generated file in whose place it stands.
     code: Mapping[Path, Path] = field(default_factory=dict)
     #: Names in the folder of what is taken from it.
@@ -51,23 +53,23 @@ class Board:
 
 
 def board_of(folder: Path, code: Path, manifest: FirmwareManifest, *, with_code: bool) -> Board | None:
-    """Return the board of a firmware folder, its C where that is asked for; None where dz_board.h is more than values.
+    """Return the board of a firmware folder, its C where that is asked for; None where there is no board without it.
 
-    What is not taken is that of `code`, as it is generated now.
+    What is not taken from the folder is that of `code`, as it is generated now.
     """
-    changed = changed_board_files(folder, manifest)
-    header = f"{manifest.target}/{BOARD_FILE}"
-    values = read_board_values(
-        ((folder if header in changed else code) / header).read_text(encoding="utf-8", errors="replace")
+    changed, header = changed_board_files(folder, manifest), f"{manifest.target}/{BOARD_FILE}"
+    made, values = (
+        read_board_values((place / header).read_text(encoding="utf-8", errors="replace"))
+        for place in (code, folder if header in changed else code)
     )
-    if values is None:
+    names = [*changed, *user_files(folder, manifest.files)]
+    names = [name for name in names if name != header and name.endswith((".c", ".h"))]
+    if made is None or values is None or (names and not with_code and code == folder):
         return None
-    names = [
-        name
-        for name in (*changed, *user_files(folder, manifest.files))
-        if name != header and name.endswith((".c", ".h"))
-    ]
-    taken = {code / name: folder / name for name in names if with_code}
+    taken = names if with_code else []
     return Board(
-        values=values, code=taken, taken=tuple(name for name in (*changed, *names) if name == header or with_code)
+        values=values,
+        lacking=tuple(sorted(made.keys() - values.keys())),
+        code={code / name: folder / name for name in taken},
+        taken=(*([header] if header in changed else []), *taken),
     )

@@ -168,6 +168,8 @@ class Bench:
         #: Numbers of the declared channels, by what they carry.
         self.channels = {role: self.device.channels.index(name) for role, name in self.names.items()}
         self.two = len(compensator.signals.signs) == 2
+        if board.lacking:
+            raise RequirementError(f"dz_board.h has no DZ_BOARD_{board.lacking[0]}, which the firmware needs")
         self._build(code)
 
     @property
