@@ -1,4 +1,4 @@
-"""Ten bugs in templates, with which the folder is what is generated: each is caught by a check that shares no code.
+"""Twelve bugs in templates, with which the folder is what is generated: each is caught by a check that shares no code.
 
 `reproduced` is silent then, for it compares with the same wrong text; so it is switched off here.
 """
@@ -20,6 +20,8 @@ from tests.support.synthetic import needs_compiler
 
 pytestmark = needs_compiler
 LAW, DRIVE = "dz_comp.c.jinja", "dz_drive.c.jinja"
+#: B minus A, in codes of sensor A.
+DIFFERENCE = "((p_b_adc * block->weight_b + block->balance - (uint32_t)p_a_adc * 4096u) >> 12)"
 #: Template, what stands there, what somebody wrote instead, and the check that sees it.
 BUGS = {
     "wrong shift": (LAW, ">> (side->reciprocal_shift", ">> 1 >> (side->reciprocal_shift", "exact-law"),
@@ -30,6 +32,12 @@ BUGS = {
         LAW, "from_band = {{ side.from_band }}", "from_band = {{ sides[0].from_band }}", "exact-law",
     ),
     "missing saturation": (LAW, "at_most(sum, side->quotient_limit)", "sum", "exact-law"),
+    "one pair, in what the interrupt calls": (DRIVE, "past = past_band(block, at_rest, away);",
+                      f"past = past_band(block, at_rest, away) + (u_adc == 1234u && {DIFFERENCE} == 567u);",
+                      "exact-law"),
+    "one pair, in the tick": (DRIVE, "uint32_t compare = drive->law;",
+                              "uint32_t compare = drive->law + (drive->law == 40028u && drive->status == 0u);",
+                              "exact-law"),
     "stale sample": (DRIVE, "uint32_t compare = drive->law;", "uint32_t compare = drive->compare_a;", "drive"),
     "debounce": (DRIVE, "- block->fault_samples) >> 31)) & ~fault", "- block->fault_samples) >> 31))", "drive"),
     "interlock": (DRIVE, "invalid | early |", "invalid |", "drive"),

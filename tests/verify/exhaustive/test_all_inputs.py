@@ -36,7 +36,7 @@ from tests.support.synthetic import needs_compiler
 
 pytestmark = needs_compiler
 
-SIGNATURE = "(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)"
+CODES = "uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc"
 
 
 def needs(machine):
@@ -58,16 +58,18 @@ def exact_law(folder, sign: int = 1) -> ExactLaw:
     return ExactLaw(read_compensator(folder), sign)
 
 
-def wrapped(core: CompiledCore, statement: str, function: str = "dz_comp") -> CompiledCore:
-    """The core with a statement that may change `compare`, the right value, before it is returned."""
-    name = "dz_comp.c"
+def wrapped(core: CompiledCore, statement: str) -> CompiledCore:
+    """The core whose drive has a statement that may change `compare`, the right value of the law, after a sample."""
+    name, body = "dz_drive.c", "right(drive, u_adc, p_a_adc, p_b_adc); uint16_t compare = drive->law;"
     text = core.sources[name].decode()
-    head = f"uint16_t {function}{SIGNATURE}\n{{"
-    assert text.count(head) == 1
-    text = text.replace(head, f"static uint16_t right{SIGNATURE}\n{{")
-    text += (
-        f"{head}\n    uint16_t compare = right(u_adc, p_a_adc, p_b_adc);\n\n    {statement}\n    return compare;\n}}\n"
+    head = f"void dz_drive_sample(struct dz_drive *drive, {CODES})\n{{"
+    text, count = re.subn(
+        r"void dz_drive_sample\(struct dz_drive \*drive, [^)]*\)\n\{",
+        f"static void right(struct dz_drive *drive, {CODES})\n{{",
+        text,
     )
+    assert count == 1
+    text += f"{head}\n    {body}\n\n    {statement}\n    drive->law = compare;\n}}\n"
     return core.edited(name, text.encode())
 
 
@@ -125,18 +127,41 @@ def test_what_is_shown_is_checked_on_both_sides(full, sign):
     ):
         assert old in text
         found = core.edited(name, text.replace(old, new).encode()).check(prepared.sample(), sample=True)
-        assert getattr(found, count) > 0 and found.faults == getattr(found, count)
+        assert getattr(found, count) > 0
+        # The drive's outputs depend on the status, and on no beta that is shown.
+        assert found.faults == getattr(found, count) or count == "bad_status"
+
+
+#: Wrong where the law that the drive holds is right: at one pair of command and pressure difference, and at one value.
+BESIDE_THE_LAW = {
+    "dz_comp()": ("dz_comp.c", "u = u_adc;\n    const uint32_t let_go",
+                  "u = u_adc + (u_adc == 1234u && p_a_adc - p_b_adc == 567);\n    const uint32_t let_go"),
+    "status": ("dz_drive.c", "    drive->status = (uint16_t)(",
+               "    drive->status = (uint16_t)((u_adc == 1234u && p_a_adc - p_b_adc == 567) | "),
+    "compare value": ("dz_drive.c", "drive->compare_a = (uint16_t)compare;",
+                      "drive->compare_a = (uint16_t)(compare + (drive->law == 40028u));"),
+}  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("part", BESIDE_THE_LAW)
+def test_what_a_right_law_becomes_is_tried_too(plain, part):
+    name, old, new = BESIDE_THE_LAW[part]
+    prepared, core = PreparedInputs(exact_law(plain)), CompiledCore(plain)
+    text = core.sources[name].decode()
+    assert old in text
+    found = core.edited(name, text.replace(old, new, 1).encode()).check(prepared.everything())
+    assert found.wrong >= 1 and (found.wrong == 1 or part == "compare value")
+    assert found.first_found == found.first_expected and "do not agree" in first_wrong(prepared, found)
 
 
 @pytest.mark.slow
 def test_both_sides_of_everything_see_a_fault_at_one_place(full):
-    for sign, function in ((1, "dz_comp"), (-1, "dz_comp_negative")):
+    for sign in (1, -1):
         prepared = PreparedInputs(exact_law(full, sign))
         core = CompiledCore(full, sign)
         code = 2048 + sign * 1000
-        found = wrapped(core, f"if (u_adc == {code}u && p_a_adc == 2000u) compare++;", function).check(
-            prepared.everything()
-        )
+        found = wrapped(core, f"if (u_adc == {code}u && p_a_adc == 2000u) compare++;").check(prepared.everything())
         assert found.wrong + found.odd_pairs >= 1
         words = first_wrong(prepared, found)
         assert words is None or f"command code {code}," in words

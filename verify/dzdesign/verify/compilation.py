@@ -21,10 +21,13 @@ from dzdesign.verify.toolchain.host_compiler import (
     name_of,
     run_compiler,
 )  # fmt: skip
+from dzdesign.verify.toolchain.int_width import typed
 from dzdesign.verify.toolchain.machines import CORTEX_M4
 
 #: Compiler and options of a target whose board files can be compiled without a vendor's library.
 COMPILERS = {"cortex-m4": (CORTEX_M4.compiler, *CORTEX_M4.core_flags)}
+#: Targets whose int has 32 bits.
+WIDE_INT = ("host", "cortex-m4")
 #: How a compiler says that a header lies elsewhere: where, only its user knows.
 ELSEWHERE = re.compile(r"error: (\S+): No such file or directory")
 
@@ -41,6 +44,24 @@ def compiles_strictly(folder: Path, manifest: FirmwareManifest) -> Check:
         return requirements.COMPILES.check(holds=False, text=str(error))
     names = ", ".join(sorted({name_of(compiler) for compiler in compilers}))
     return requirements.COMPILES.check(holds=True, text=f"{' '.join(STRICT)}: {names}")
+
+
+def fits_target_int(folder: Path, manifest: FirmwareManifest) -> Check:
+    """Tell whether the C computes the same with an int of 16 bits: the core, which is one for all targets, and for a
+    target with such an int all that was generated.
+    """
+    sources = {Path(name).name: (folder / name).read_bytes() for name in manifest.files if name.endswith((".c", ".h"))}
+    generated = manifest.core if manifest.target in WIDE_INT else set(manifest.files) - set(manifest.board)
+    names = sorted(Path(name).name for name in generated if name.endswith(".c"))
+    try:
+        files = [typed(sources, name) for name in names]
+    except RequirementError as error:
+        return requirements.INT_WIDTH.check(holds=False, text=str(error))
+    found, operations = [each for file in files for each in file.findings], sum(file.operations for file in files)
+    text = f"{operations} operations in {', '.join(names)}, each with an int of 16 and of 32 bits: the same results"
+    if found:
+        text = found[0] + (f", and {len(found) - 1} more" if len(found) > 1 else "")
+    return requirements.INT_WIDTH.check(holds=not found, text=text)
 
 
 def check_include(include: Sequence[Path], manifest: FirmwareManifest) -> None:

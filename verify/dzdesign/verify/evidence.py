@@ -78,7 +78,9 @@ class InputCounts:
     inputs: Annotated[
         Count, about("Number of pairs of command code and pressure-difference code, each compared with the exact law.")
     ]
-    wrong: Annotated[Count, about("Number of pairs whose compare value is not the exactly rounded law.")]
+    wrong: Annotated[
+        Count, about("Number of pairs at which dz_comp() or the drive does not give the exactly rounded law.")
+    ]
     largest_error: Annotated[
         int, quantity("compare counts", "Largest difference from the exactly rounded law.", ge=0, le=2**32)
     ]

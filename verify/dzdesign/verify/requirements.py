@@ -71,6 +71,7 @@ REPRODUCED = Requirement(id="reproduced", title="the files are reproduced from c
 OVERFLOW = Requirement(id="overflow", title="no operation leaves the range of its type")
 STATES = Requirement(id="states", title="status and what is remembered match their description")
 COMPILES = Requirement(id="compiles", title="compiles without warnings")
+INT_WIDTH = Requirement(id="int-width", title="no operation needs an int wider than the target's 16 bits")
 EXACT_LAW = Requirement(id="exact-law", title="equals the exactly rounded law")
 MONOTONE = Requirement(id="monotone", title="within range and monotone")
 ZERO_COMMAND = Requirement(id="over-compensation", title="no over-compensation in the tested pressure range")
@@ -194,7 +195,9 @@ OF_LOOP = (
     PLANT_OPENS, PLANT_IS_THE_VALVE, ZERO_FLOW, ZERO_FLOW_AFTER_SCENARIOS, CURRENT_VALVE, COMPENSATES, NATIVE_PLANT,
 )  # fmt: skip
 #: What every run tries; evidence that lacks one of them is not that of a firmware that holds.
-ALWAYS = (REPRODUCED, COMPILES, *OF_INPUTS, DRIVE, *(each for each in OF_LOOP if each is not CURRENT_VALVE))
+ALWAYS = (
+    REPRODUCED, COMPILES, INT_WIDTH, *OF_INPUTS, DRIVE, *(each for each in OF_LOOP if each is not CURRENT_VALVE),
+)  # fmt: skip
 #: What the closed loop tries beside it, if it is given what that takes.
 OF_GIVEN_LOOP = (OWN_PLANT, LOAD_STEPS)
 #: What a verdict adds where the ramp tests were not there.

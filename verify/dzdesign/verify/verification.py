@@ -24,7 +24,7 @@ from dzdesign.verify.closed_loop.loop import RampSequence
 from dzdesign.verify.closed_loop.plant import Plant
 from dzdesign.verify.closed_loop.ramps import Curves, LoopComparison, csv_of, loop_curves
 from dzdesign.verify.closed_loop.scene import Scene, scenes_of
-from dzdesign.verify.compilation import board_compiles, check_include, compiles_strictly
+from dzdesign.verify.compilation import board_compiles, check_include, compiles_strictly, fits_target_int
 from dzdesign.verify.current.current_checks import CurrentChecks, current_checks
 from dzdesign.verify.evidence import Evidence, InputCheck
 from dzdesign.verify.exhaustive.all_inputs import every_input, input_checks, lot_checked
@@ -196,6 +196,11 @@ REQUIREMENTS: tuple[Tried[Firmware], ...] = (
         Firmware.is_as_generated,
     ),
     Tried((requirements.COMPILES,), _compiles, Firmware.is_as_generated),
+    Tried(
+        (requirements.INT_WIDTH,),
+        lambda each: [fits_target_int(each.code, each.manifest)],
+        Firmware.is_as_generated,
+    ),
     Tried(
         (*requirements.OF_HARDWARE, requirements.BOARD_CODE),
         _hardware,

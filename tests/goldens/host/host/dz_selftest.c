@@ -112,11 +112,11 @@ static uint16_t next_command(struct walk *walk)
     walk->samples++;
     if (walk->aim > walk->at)
     {
-        walk->at = (uint16_t)(walk->at + ((walk->aim - walk->at) / 4u));
+        walk->at = (uint16_t)(walk->at + ((uint16_t)(walk->aim - walk->at) / 4u));
     }
     else
     {
-        walk->at = (uint16_t)(walk->at - ((walk->at - walk->aim) / 4u));
+        walk->at = (uint16_t)(walk->at - ((uint16_t)(walk->at - walk->aim) / 4u));
     }
     noisy = (int32_t)walk->at + (int32_t)draw(walk, 9u) - 4;
     command = (noisy < 0) ? 0 : noisy;

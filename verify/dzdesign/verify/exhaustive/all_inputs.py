@@ -89,10 +89,12 @@ def first_wrong(prepared: PreparedInputs, found: Findings) -> str | None:
     """Return the first wrong value in words, or None."""
     if not found.wrong:
         return None
+    what = f"compare value {found.first_found}, expected {found.first_expected}"
+    if found.first_found == found.first_expected:
+        what = f"the drive's outputs or status, or dz_comp(), do not agree with compare value {found.first_found}"
     return (
         f"command code {prepared.code_at(found.first_place)}, pressure-difference code "
-        f"{prepared.differences.values[found.first_row]}: compare value {found.first_found}, "
-        f"expected {found.first_expected}"
+        f"{prepared.differences.values[found.first_row]}: {what}"
     )
 
 

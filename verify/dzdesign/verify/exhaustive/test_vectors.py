@@ -10,7 +10,8 @@ from math import lcm
 import numpy as np
 
 from dzdesign.core.errors import RequirementError
-from dzdesign.verify.exhaustive.exact_law import BETA_UNIT, ExactLaw
+from dzdesign.verify.exhaustive.exact_drive import HELD, LATCHED, STEP_UNIT
+from dzdesign.verify.exhaustive.exact_law import BETA_UNIT, DIFFERENCE, ExactLaw
 from dzdesign.verify.toolchain.compiled_core import DIRECTION, PAIR, PART, PLAN, ROW
 
 #: Codes beyond the converter's range: the largest that 16 bits hold.
@@ -219,7 +220,7 @@ class PreparedInputs:
 
     def _assembled(self, chosen: np.ndarray, places: np.ndarray, stride: int, how: dict[str, bool]) -> bytes:
         """Return the plan and its tables, one after the other, each at a multiple of 8 bytes."""
-        exact, safe = self.exact, int(self._law_of[-1])
+        exact, safe, functions = self.exact, int(self._law_of[-1]), self.exact.compensator.drive_functions
         laws, rows = self._laws(), self._rows()[chosen]
         used, rows["law"] = np.unique(np.append(rows["law"], safe), return_inverse=True)[0], rows["law"]
         rows["law"] = np.searchsorted(used, rows["law"])
@@ -242,6 +243,12 @@ class PreparedInputs:
             "turn": exact.turn,
             "reverse": exact.reverse,
             "tested_to": exact.tested_to,
+            "dither_counts": functions.dither_counts,
+            "dither_ticks": functions.dither_ticks,
+            "both": len(exact.compensator.signals.signs) == 2,
+            "leave_zero": functions.leave_zero_codes,
+            "ramp_unit": STEP_UNIT,
+            "failed_status": DIFFERENCE + HELD + LATCHED * (functions.fault_latch and functions.fault_samples == 1),
             "lowest": self.differences.values[0],
             "safe_law": np.searchsorted(used, safe),
             "safe_at_zero": min(max(at_zero, 0), exact.compare_limit),

@@ -24,12 +24,13 @@ from dzdesign.verify.toolchain.machines import (
     bound_files,
 )
 
-#: Source of the law, and what the names of its functions end with, by the sign of command.
-SOURCE, ENDINGS = "dz_comp.c", {1: "", -1: "_negative"}
+#: Source of the law, and what the names of its functions end with, by the sign of command; and of the drive around it,
+#: which the interrupt calls. An output with the law alone has none.
+SOURCE, ENDINGS, DRIVE_SOURCE = "dz_comp.c", {1: "", -1: "_negative"}, "dz_drive.c"
 #: What the check in C calls, and the core's functions of a side.
 CALLED = {"DZ_CORE": "dz_comp", "DZ_STATUS": "dz_status", "DZ_BETA": "dz_beta"}
 #: The check in C, of programs/; its functions.
-CHECK = ("every_input.c", "other_codes.c", "every_input.h", "march.h")
+CHECK = ("every_input.c", "other_codes.c", "called.h", "every_input.h", "march.h")
 EVERYTHING = Function("dz_check_everything", ("in", "out", "out", "out"))
 SAMPLE = Function("dz_check_sample", ("in", "out"))
 #: The layouts of programs/every_input.h.
@@ -38,7 +39,8 @@ SCALARS = (
     "parts", "codes", "first_code", "code_step", "sound_from", "sound_to", "zero_place", "zero_code", "compare_limit",
     "a_low", "a_high", "b_low", "b_high", "turn", "reverse", "lowest", "safe_law", "safe_at_zero", "rows", "pairs",
     "places", "stride", "cube", "impatient", "laws_at", "rows_at", "directions_at", "slant_at", "pairs_at",
-    "places_at", "betas_at", "tested_to",
+    "places_at", "betas_at", "tested_to", "dither_counts", "dither_ticks", "both", "leave_zero", "ramp_unit",
+    "failed_status",
 )  # fmt: skip
 PLAN = np.dtype([("denominator", "<i8", PARTS), ("part_end", "<i4", PARTS), *((name, "<i4") for name in SCALARS)])
 PART = np.dtype([("remainder", "<i8"), ("carry", "<i8"), ("quotient", "<i4"), ("step", "<i4")])
@@ -72,11 +74,14 @@ class CompiledCore:
     """One side of the core."""
 
     def __init__(self, folder: Path, sign: int = 1, block: bytes | None = None) -> None:
-        self.name, self._ending = SOURCE, ENDINGS[sign]
+        self.name, self._sign = SOURCE, sign
         #: Octets of the calibration block, by default the folder's own; None of a core with its valve's numbers in it.
         self.block = block_of(folder) if block is None else block
-        headers = ["dz_comp.h", BLOCK_HEADER, *([VALVE_HEADER] if self.block is None else [])]
-        self.sources = {name: _read(folder / "core" / name) for name in (self.name, *headers)}
+        driven = (folder / "core" / DRIVE_SOURCE).exists()
+        self.units = (SOURCE, *([DRIVE_SOURCE] if driven else []))
+        self._headers = ["dz_comp.h", BLOCK_HEADER, *(["dz_drive.h"] if driven else [])]
+        named = [*self.units, *self._headers, *([VALVE_HEADER] if self.block is None else [])]
+        self.sources = {name: _read(folder / "core" / name) for name in named}
 
     @property
     def sha256(self) -> str:
@@ -89,21 +94,23 @@ class CompiledCore:
         other.sources = {**self.sources, name: text}
         return other
 
-    def compiled(self, machine: Machine = HOST) -> Path:
-        """Return the core's object for a machine: compiled alone, so that nothing of it is inlined into the check."""
-        return machine.compile(self.name, self.sources, machine.core_flags, f"the core {self.name}")
+    def compiled(self, machine: Machine = HOST, name: str = SOURCE) -> Path:
+        """Return an object of the core for a machine: compiled alone, so that nothing is inlined into the check."""
+        headers = {each: text for each, text in self.sources.items() if each.endswith(".h")}
+        return machine.compile(name, {**headers, name: self.sources[name]}, machine.core_flags, f"the core {name}")
 
     def check(self, prepared: bytes, machine: Machine = HOST, *, sample: bool = False) -> Findings:
         """Try what was prepared on a machine; a core that does not compile, crashes or hangs: `RequirementError`."""
-        core, what = self.compiled(machine), f"the core {self.name}"
-        flags = (*machine.check_flags, *(f"-D{name}={called}{self._ending}" for name, called in CALLED.items()))
-        headers = {name: self.sources[name] for name in ("dz_comp.h", BLOCK_HEADER)} | machine.headers
+        core, what = [self.compiled(machine, name) for name in self.units], f"the core {self.name}"
+        flags = (*machine.check_flags, *(f"-D{name}={called}{ENDINGS[self._sign]}" for name, called in CALLED.items()))
+        flags += (f"-DDZ_SIDE={self._sign}",) if DRIVE_SOURCE in self.units else ()
+        headers = {name: self.sources[name] for name in self._headers} | machine.headers
         check = {name: _read(PROGRAMS / name) for name in (*CHECK, *filter(None, [machine.main]))}
         bound = {name: text.encode() for name, text in bound_files(self.block).items()}
         headers |= {name: text for name, text in (check | bound).items() if name.endswith(".h")}
         units = {name: text for name, text in (check | bound).items() if name.endswith(".c")}
         compiled = [machine.compile(name, {**headers, name: text}, flags, "the check") for name, text in units.items()]
-        objects = [core, *compiled]
+        objects = [*core, *compiled]
         if not machine.main:
             counts, hashed, at_zero = _tried(objects, machine, prepared, what, sample=sample)
         else:
@@ -111,7 +118,7 @@ class CompiledCore:
             printed = machine.run(machine.link(objects, f"{what} ({machine.name})"), [], what)
             counts, hashed = counts_in(printed, f"{what} on the {machine.name}")
             at_zero = np.zeros(0, dtype=np.int64)
-        digest = sha256_of_octets(core.read_bytes())
+        digest = sha256_of_octets(b"".join(each.read_bytes() for each in core))
         return Findings(outputs_hash=f"{hashed:016x}", at_zero=at_zero, object_sha256=digest, **counts)
 
 

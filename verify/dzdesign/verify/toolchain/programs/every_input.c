@@ -1,19 +1,15 @@
 /* Every input of the compiled core against the exactly rounded law, in one pass with all that must hold of it.
  *
  * The law comes as exact integers: a quotient and a remainder that advance by addition with carry. The core is called
- * and never seen: it is an object of its own. `int` may have 16 bits here.
+ * as the interrupt does, see called.h, and never seen: it is objects of its own. `int` may have 16 bits here.
  */
+#include "called.h"
 #include "every_input.h"
 #include "march.h"
 
-#include "dz_comp.h"
-
-#ifdef DZ_CALIBRATION_WORDS
-#include "bound.h"
-#endif
-
 /* By itself, so that the linker can lay it beside the core: an emulator's jumps are quick within a page. */
 #define NEAR __attribute__((noinline))
+#define ALL_BITS 0xFFFFu
 #define HASH_START UINT64_C(0xCBF29CE484222325)
 #define HASH_FACTOR UINT64_C(0x100000001B3)
 
@@ -40,22 +36,37 @@ NEAR static uint64_t hashed(uint64_t hash, const uint16_t *values, int32_t count
     return hash;
 }
 
-/* A wrong value: of the core's law, or, where the lowest pair of the difference gives the right one, of the pair. */
-static void note_wrong(const struct dz_plan *plan, const struct dz_row *row, int32_t place, uint16_t u_adc,
-                       uint16_t p_a, uint16_t found, uint16_t expected, struct dz_findings *findings)
+/* The input at a place of a row: each command has another pair of pressures that makes the row's difference. */
+static struct called call_at(const struct dz_plan *plan, const struct dz_drive *ready, const struct dz_row *row,
+                             const int32_t DZ_TABLE *slant, int32_t place)
 {
-    const int32_t error = (int32_t)found - (int32_t)expected;
+    const uint16_t p_b = (uint16_t)(row->b_low + (uint16_t)(((int32_t)row->first + place) % (int32_t)row->pairs));
+
+    return call(plan, ready, code_at(plan, place), (uint16_t)(row->offset + slant[p_b]), p_b,
+                status_at(plan, row->offset * plan->turn), ALL_BITS);
+}
+
+/* What an input gives that is not right: of the core's law, or, where the lowest pair of the difference gives the right
+ * one, of the pair; of a right law what the drive makes of it. */
+static void note_wrong(const struct dz_plan *plan, const struct dz_drive *ready, const struct dz_row *row,
+                       const int32_t DZ_TABLE *slant, int32_t place, struct called found, uint16_t expected,
+                       struct dz_findings *findings)
+{
+    const int32_t error = (int32_t)found.law - (int32_t)expected;
     const uint32_t size = (uint32_t)(error < 0 ? -error : error);
+    struct called lowest;
 
     findings->calls++;
-    if (DZ_CORE(u_adc, p_a, row->b_low) == expected) {
+    lowest = call(plan, ready, code_at(plan, place), (uint16_t)(row->offset + slant[row->b_low]), row->b_low,
+                  status_at(plan, row->offset * plan->turn), ALL_BITS);
+    if (lowest.law == expected && lowest.unlike == 0u) {
         findings->odd++;
         return;
     }
     if (findings->wrong == 0u) {
         findings->first_row = row->offset * plan->turn - plan->lowest;
         findings->first_place = place;
-        findings->first_found = found;
+        findings->first_found = found.law;
         findings->first_expected = expected;
     }
     findings->wrong++;
@@ -64,13 +75,15 @@ static void note_wrong(const struct dz_plan *plan, const struct dz_row *row, int
 
 /* ---- all commands at all differences ---- */
 
-/* All commands at one difference, each with another pair of pressures that makes it. */
-NEAR static void fill_row(const struct dz_plan *plan, const struct dz_row *row, const int32_t *slant, uint16_t *out)
+/* All commands at one difference, each with another pair of pressures that makes it: not 0 where one is unlike. */
+NEAR static uint32_t fill_row(const struct dz_plan *plan, const struct dz_drive *ready, const struct dz_row *row,
+                              const int32_t *slant, uint16_t *out)
 {
-    const uint16_t step = (uint16_t)plan->code_step;
+    const uint16_t step = (uint16_t)plan->code_step, status = status_at(plan, row->offset * plan->turn);
     const int32_t offset = row->offset;
     uint16_t u_adc = (uint16_t)plan->first_code;
     int32_t pair = row->first, left = plan->codes;
+    uint32_t unlike = 0;
 
     while (left > 0) {
         const int32_t spare = row->pairs - pair, run = left < spare ? left : spare;
@@ -78,7 +91,10 @@ NEAR static void fill_row(const struct dz_plan *plan, const struct dz_row *row, 
         uint16_t p_b = (uint16_t)(row->b_low + pair);
 
         for (int32_t k = 0; k < run; k++) {
-            out[k] = DZ_CORE(u_adc, (uint16_t)(offset + lean[k]), p_b);
+            const struct called found = call(plan, ready, u_adc, (uint16_t)(offset + lean[k]), p_b, status, ALL_BITS);
+
+            out[k] = found.law;
+            unlike |= found.unlike;
             u_adc = (uint16_t)(u_adc + step);
             p_b++;
         }
@@ -86,6 +102,7 @@ NEAR static void fill_row(const struct dz_plan *plan, const struct dz_row *row, 
         left -= run;
         pair = 0;
     }
+    return unlike;
 }
 
 /* What a row of compare values is like by itself. */
@@ -117,14 +134,14 @@ NEAR static uint32_t differs(const struct dz_plan *plan, const uint16_t *out, co
     return bits;
 }
 
-static void note_differences(const struct dz_plan *plan, const struct dz_row *row, const int32_t *slant,
-                             const uint16_t *out, const uint16_t *expected, struct dz_findings *findings)
+static void note_differences(const struct dz_plan *plan, const struct dz_drive *ready, const struct dz_row *row,
+                             const int32_t *slant, const uint16_t *expected, struct dz_findings *findings)
 {
     for (int32_t k = 0; k < plan->codes; k++) {
-        if (out[k] != expected[k]) {
-            const uint16_t p_a = (uint16_t)(row->offset + slant[row->b_low]);
+        const struct called found = call_at(plan, ready, row, slant, k);
 
-            note_wrong(plan, row, k, code_at(plan, k), p_a, out[k], expected[k], findings);
+        if (found.law != expected[k] || found.unlike != 0u) {
+            note_wrong(plan, ready, row, slant, k, found, expected[k], findings);
         }
     }
 }
@@ -160,6 +177,7 @@ static void check_rows(const struct dz_plan *plan, const uint8_t *prepared, uint
     const struct dz_row *rows = (const struct dz_row *)(prepared + plan->rows_at);
     const struct dz_direction *directions = (const struct dz_direction *)(prepared + plan->directions_at);
     const int32_t *slant = (const int32_t *)(prepared + plan->slant_at);
+    const struct dz_drive ready = run_in();
     uint16_t *expected = work, *out = &work[plan->codes], *before = &work[2 * plan->codes];
     struct row_counts counts = {0, 0};
     int32_t law = -1;
@@ -180,10 +198,10 @@ static void check_rows(const struct dz_plan *plan, const uint8_t *prepared, uint
             march(&at, plan, plan->codes, expected, 1);
             known = 0;
         }
-        fill_row(plan, &rows[row], slant, out);
-        wrong = differs(plan, out, expected);
+        wrong = fill_row(plan, &ready, &rows[row], slant, out);
+        wrong |= differs(plan, out, expected);
         if (wrong != 0u) {
-            note_differences(plan, &rows[row], slant, out, expected, findings);
+            note_differences(plan, &ready, &rows[row], slant, expected, findings);
         }
         if (wrong != 0u || known == 0u) { /* else it is value by value the row before, and so are the counts */
             counts = counts_of(plan, out);
@@ -207,14 +225,16 @@ static void check_rows(const struct dz_plan *plan, const uint8_t *prepared, uint
 
 /* Pressures A from `first` to `last` at one pressure B and zero command: how many give another value than theirs, which
  * stands at `value` and moves by `step`. */
-NEAR static void odd_pairs(const struct dz_plan *plan, int32_t first, int32_t last, uint16_t p_b, const uint16_t *value,
-                      int32_t step, struct dz_findings *findings)
+NEAR static void odd_pairs(const struct dz_plan *plan, const struct dz_drive *ready, int32_t first, int32_t last,
+                           uint16_t p_b, const uint16_t *value, int32_t step, struct dz_findings *findings)
 {
     const uint16_t zero = (uint16_t)plan->zero_code;
     uint32_t odd = 0;
 
     for (int32_t p_a = first; p_a <= last; p_a++) {
-        odd += DZ_CORE(zero, (uint16_t)p_a, p_b) != *value;
+        const struct called found = call(plan, ready, zero, (uint16_t)p_a, p_b, 0, 0);
+
+        odd += found.law != *value || found.unlike != 0u;
         value += step;
     }
     findings->odd += odd;
@@ -227,13 +247,14 @@ static void check_cube(const struct dz_plan *plan, const int32_t *slant, const u
                        struct dz_findings *findings)
 {
     const uint16_t safe = (uint16_t)plan->safe_at_zero;
+    const struct dz_drive ready = run_in();
 
     for (int32_t code = 0; code < plan->codes; code++) {
         const uint16_t p_b = (uint16_t)code;
         int32_t low = plan->a_low, high = plan->a_high; /* of pressures A whose difference is -reverse or more */
 
         if (code < plan->b_low || code > plan->b_high) {
-            odd_pairs(plan, 0, plan->codes - 1, p_b, &safe, 0, findings);
+            odd_pairs(plan, &ready, 0, plan->codes - 1, p_b, &safe, 0, findings);
             continue;
         }
         if (plan->turn > 0) {
@@ -241,12 +262,13 @@ static void check_cube(const struct dz_plan *plan, const int32_t *slant, const u
         } else {
             high = slant[code] + plan->reverse < high ? slant[code] + plan->reverse : high;
         }
-        odd_pairs(plan, 0, plan->a_low - 1, p_b, &safe, 0, findings);
+        odd_pairs(plan, &ready, 0, plan->a_low - 1, p_b, &safe, 0, findings);
         if (low <= high) {
-            odd_pairs(plan, low, high, p_b, &at_zero[plan->turn * (low - slant[code]) - plan->lowest], plan->turn,
-                      findings);
+            const uint16_t *value = &at_zero[plan->turn * (low - slant[code]) - plan->lowest];
+
+            odd_pairs(plan, &ready, low, high, p_b, value, plan->turn, findings);
         }
-        odd_pairs(plan, plan->a_high + 1, plan->codes - 1, p_b, &safe, 0, findings);
+        odd_pairs(plan, &ready, plan->a_high + 1, plan->codes - 1, p_b, &safe, 0, findings);
     }
 }
 
@@ -259,6 +281,7 @@ static void check_places(const struct dz_plan *plan, const uint8_t DZ_TABLE *pre
     const struct dz_row DZ_TABLE *rows = (const struct dz_row DZ_TABLE *)(prepared + plan->rows_at);
     const int32_t DZ_TABLE *slant = (const int32_t DZ_TABLE *)(prepared + plan->slant_at);
     const int32_t DZ_TABLE *places = (const int32_t DZ_TABLE *)(prepared + plan->places_at);
+    const struct dz_drive ready = run_in();
     uint16_t out[DZ_MAX_PLACES];
 
     for (int32_t index = 0; index < plan->rows; index++) {
@@ -267,16 +290,14 @@ static void check_places(const struct dz_plan *plan, const uint8_t DZ_TABLE *pre
 
         for (int32_t k = 0; k < plan->places; k++) {
             const int32_t place = places[k];
-            const uint16_t p_b = (uint16_t)(row.b_low + (uint16_t)(((int32_t)row.first + place) % (int32_t)row.pairs));
-            const uint16_t u_adc = code_at(plan, place), p_a = (uint16_t)(row.offset + slant[p_b]);
+            const struct called found = call_at(plan, &ready, &row, slant, place);
             uint16_t expected = 0;
 
             march(&at, plan, place + 1 - at.place, &expected, 0);
-            out[k] = DZ_CORE(u_adc, p_a, p_b);
-            findings->out_of_range += out[k] > plan->compare_limit;
-            if (out[k] != expected) {
-                note_wrong(plan, &row, place, u_adc, (uint16_t)(row.offset + slant[row.b_low]), out[k],
-                           expected, findings);
+            out[k] = found.law;
+            findings->out_of_range += found.law > plan->compare_limit;
+            if (found.law != expected || found.unlike != 0u) {
+                note_wrong(plan, &ready, &row, slant, place, found, expected, findings);
             }
         }
         findings->hash = hashed(findings->hash, out, plan->places);

@@ -38,6 +38,9 @@ struct dz_plan {
     int32_t impatient;           /* 1: the first row with a fault is the last */
     int32_t laws_at, rows_at, directions_at, slant_at, pairs_at, places_at, betas_at;
     int32_t tested_to; /* largest difference of the tests: above it the status says so */
+    /* Of the drive: its dither, two sides, the codes by which a command leaves zero, a ramp's code, and the status of a
+     * difference that can't be right. */
+    int32_t dither_counts, dither_ticks, both, leave_zero, ramp_unit, failed_status;
 };
 
 /* A part of the law, straight in the command: counts (and a half) at its first place, and what a place adds. */
@@ -70,7 +73,7 @@ struct dz_findings {
     uint64_t hash; /* of all compare values, in their order */
     uint32_t inputs, wrong, largest_error, out_of_range, falls, against, odd, bad_fallbacks, bad_status, bad_betas, calls;
     int32_t first_row, first_place; /* of the first wrong value */
-    int32_t first_found, first_expected, unused;
+    int32_t first_found, first_expected, unused; /* equal: what the drive makes of it is wrong, or dz_comp() */
 };
 
 /* All inputs. `work` holds three rows of codes, `at_zero` takes what the core gives at zero command for each row. */
