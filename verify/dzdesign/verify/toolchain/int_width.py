@@ -11,17 +11,31 @@ import re
 from collections import ChainMap
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
 
 from pycparser import c_ast
 from pycparser.c_generator import CGenerator
 from pycparser.c_parser import CParser, ParseError
 
 from dzdesign.core.errors import RequirementError
+from dzdesign.verify.toolchain.c_integers import (
+    FIXED,
+    FIXED_BITS,
+    HOST_INT,
+    INT,
+    SIZE,
+    TARGET_INT,
+    TARGET_LARGEST,
+    Form,
+    Int,
+    Value,
+    any_of,
+    constant,
+    ends_of,
+    fewer,
+)
 from dzdesign.verify.toolchain.host_compiler import built, host_compiler, words_of
 
 #: In place of the compiler's own headers: names of types that are known here by their widths, and the limits in use.
-FIXED_BITS = (8, 16, 32, 64)
 STANDARD = {
     "stdint.h": "".join(f"typedef int int{bits}_t, uint{bits}_t;\n" for bits in FIXED_BITS)
     + "".join(f"#define UINT{bits}_C(c) ((uint{bits}_t)c##uLL)\n#define INT{bits}_C(c) ((int{bits}_t)c##LL)\n"
@@ -37,85 +51,9 @@ INCLUDED = re.compile(rb'^\s*#\s*include\s+["<]([^">]+)[">]', re.MULTILINE)
 REFUSAL = re.compile(rb"#\s*error")
 #: Its types: a word with a capital before a name. In a comment it does no harm. Here no number is known to be of one.
 MAKERS_TYPE = re.compile(rb"\b([A-Z]\w*[a-z]\w*)\s+\**[a-z]\w*\s*[;,)=\[]")
+COMPARISONS = ("<", ">", "<=", ">=", "==", "!=")
 #: Characters of an expression in a sentence, and shifts that no type has.
 LONGEST, FARTHEST = 60, 64
-
-
-class Form(NamedTuple):
-    """A type of integers on one machine."""
-
-    bits: int
-    signed: bool
-
-    @property
-    def ends(self) -> tuple[int, int]:
-        """The least and the largest number."""
-        half = 1 << (self.bits - 1)
-        return (-half, half - 1) if self.signed else (0, 2 * half - 1)
-
-    def promoted(self, int_bits: int) -> "Form":
-        """Return the type in which arithmetic takes it."""
-        return Form(int_bits, True) if self.bits < int_bits else self
-
-    def common(self, other: "Form") -> "Form":
-        """Return the type of a sum of two promoted ones."""
-        if self.bits == other.bits:
-            return Form(self.bits, self.signed and other.signed)
-        return max(self, other)
-
-
-@dataclass(frozen=True, slots=True)
-class Int:
-    """A type of integers on the target and on this PC."""
-
-    target: Form
-    host: Form
-
-    @property
-    def is_fixed(self) -> bool:
-        """Whether it is the same on both."""
-        return self.target == self.host
-
-    @property
-    def bits(self) -> int:
-        """Bits that it has on both."""
-        return min(self.target.bits, self.host.bits)
-
-    @property
-    def ends(self) -> tuple[int, int]:
-        """The least and the largest number that both hold."""
-        (low, high), (host_low, host_high) = self.target.ends, self.host.ends
-        return max(low, host_low), min(high, host_high)
-
-    def holds(self, low: int, high: int) -> bool:
-        """Tell whether both hold all numbers of a range."""
-        return self.ends[0] <= low and high <= self.ends[1]
-
-    def promoted(self) -> "Int":
-        """Return the type in which arithmetic takes it."""
-        return Int(self.target.promoted(TARGET_INT), self.host.promoted(HOST_INT))
-
-    def common(self, other: "Int") -> "Int":
-        """Return the type of a sum."""
-        mine, others = self.promoted(), other.promoted()
-        return Int(mine.target.common(others.target), mine.host.common(others.host))
-
-
-TARGET_INT, HOST_INT, TARGET_LARGEST = 16, 32, 32767
-INT = Int(Form(TARGET_INT, True), Form(HOST_INT, True))
-SIZE = Int(Form(32, False), Form(64, False))
-FIXED = {f"{'' if signed else 'u'}int{bits}_t": Int(Form(bits, signed), Form(bits, signed))
-         for bits in FIXED_BITS for signed in (True, False)}  # fmt: skip
-
-
-class Value(NamedTuple):
-    """What is known of a number."""
-
-    type: Int
-    low: int
-    high: int
-    #: Low bits that are equal on target and PC; None: the numbers are.
-    same: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -312,7 +250,7 @@ class Widths:
             return self._exact(node)
         found = self._value(node)
         if not isinstance(found, Value):
-            return _any(to)
+            return any_of(to)
         stored = self._converted(node, found, to)
         if stored.same is not None:
             self._needs_more(node, stored.same)
@@ -324,7 +262,7 @@ class Widths:
         if to.is_fixed:
             if value.same is not None and value.same < to.bits:
                 self._needs_more(node, value.same)
-            return _any(to)
+            return any_of(to)
         return Value(to, *to.ends, min(to.bits, value.same or to.bits))
 
     def _result(self, node: c_ast.Node, of: Int, ends: tuple[int, int], same: int | None) -> Value:
@@ -332,18 +270,20 @@ class Widths:
         if same is None and of.holds(*ends):
             return Value(of, *ends)
         if of.is_fixed:
-            return _any(of)
+            return any_of(of)
         leaves = [form for form in (of.target, of.host) if form.signed and not Int(form, form).holds(*ends)]
         if same is None and leaves:
             self._needs_more(node, leaves[0].bits)
-            return _any(of)
+            return any_of(of)
         return Value(of, *of.ends, min(of.bits, same or of.bits))
 
     def _value(self, node: c_ast.Node) -> Known:
         """Return what is known of an expression."""
         match node:
+            case c_ast.Constant(type="char"):
+                return Value(INT, 0, 127)
             case c_ast.Constant():
-                return _constant(node)
+                return constant(node.value) if "int" in node.type else None
             case c_ast.ID():
                 return _of_type(self._names.get(node.name))
             case c_ast.StructRef():
@@ -361,7 +301,7 @@ class Widths:
                 to, found = self._type(node.to_type), self._value(node.expr)
                 if not isinstance(to, Int):
                     return _of_type(to)
-                return self._converted(node.expr, found, to) if isinstance(found, Value) else _any(to)
+                return self._converted(node.expr, found, to) if isinstance(found, Value) else any_of(to)
             case c_ast.Assignment():
                 return self._assigned(node)
             case c_ast.TernaryOp():
@@ -400,7 +340,7 @@ class Widths:
             return left or right
         of = left.type.common(right.type)
         both = self._converted(node.iftrue, left, of), self._converted(node.iffalse, right, of)
-        return Value(of, min(each.low for each in both), max(each.high for each in both), _fewer(both))
+        return Value(of, min(each.low for each in both), max(each.high for each in both), fewer(both))
 
     def _unary(self, node: c_ast.UnaryOp) -> Known:
         if node.op == "sizeof":
@@ -425,7 +365,7 @@ class Widths:
 
     @staticmethod
     def _number(found: Known) -> Value:
-        return found if isinstance(found, Value) else _any(INT)
+        return found if isinstance(found, Value) else any_of(INT)
 
     def _binary(self, node: c_ast.Node, op: str, left_node: c_ast.Node, right_node: c_ast.Node) -> Known:
         self.operations += 1
@@ -456,7 +396,7 @@ class Widths:
                 if mask.same is None and mask.low >= 0 and mask.high.bit_length() <= (other.same or FARTHEST):
                     high = mask.high if other.same or other.low < 0 else min(mask.high, other.high)
                     return Value(of, 0, high)
-        return self._result(node, of, _ends(op, *both), _fewer(both))
+        return self._result(node, of, ends_of(op, *both), fewer(both))
 
     def _shifted(self, node: c_ast.Node, op: str, left_node: c_ast.Node, right_node: c_ast.Node) -> Known:
         left, right = self._number(self._value(left_node)), self._number(self._exact(right_node))
@@ -467,56 +407,11 @@ class Widths:
             taken = taken._replace(same=None)
         if not of.is_fixed and not (right.low >= 0 and right.high < of.bits):
             self._found(node, f"shifts a number of {of.bits} bits on the target by {of.bits} or more")
-            return _any(of)
+            return any_of(of)
         least, most = (min(max(end, 0), FARTHEST) for end in (right.low, right.high))
         made = [end << by if op == "<<" else end >> by for end in taken[1:3] for by in (least, most)]
         return self._result(node, of, (min(made), max(made)), taken.same)
 
 
-COMPARISONS = ("<", ">", "<=", ">=", "==", "!=")
-
-
-def _any(of: Int) -> Value:
-    return Value(of, *of.ends)
-
-
 def _of_type(found: Typed | Value) -> Known:
-    return _any(found) if isinstance(found, Int) else found
-
-
-def _fewer(values: tuple[Value, ...]) -> int | None:
-    return min((each.same for each in values if each.same is not None), default=None)
-
-
-def _ends(op: str, left: Value, right: Value) -> tuple[int, int]:
-    """Return the least and the largest result of two numbers; of a quotient for a divisor of any size."""
-    if op == "+":
-        return left.low + right.low, left.high + right.high
-    if op == "-":
-        return left.low - right.high, left.high - right.low
-    if op == "*":
-        made = [one * other for one in left[1:3] for other in right[1:3]]
-        return min(made), max(made)
-    largest = max(abs(end) for end in left[1:3])
-    if op in "/%":
-        return (-largest if left.low < 0 or right.low < 0 else 0), largest
-    bits = max(end.bit_length() for end in (*left[1:3], *right[1:3]))
-    return (0 if min(left.low, right.low) >= 0 else -(1 << bits)), (1 << bits) - 1
-
-
-def _constant(node: c_ast.Constant) -> Known:
-    """Return the value of a constant, in the first type that holds it on each machine."""
-    if node.type == "char":
-        return Value(INT, 0, 127)
-    if "int" not in node.type and "long" not in node.type:
-        return Pointer(Int(Form(8, True), Form(8, True))) if node.type == "string" else None
-    digits = node.value.lower().rstrip("ul")
-    suffix = node.value.lower()[len(digits) :]
-    octal = digits.startswith("0") and digits.isdigit() and len(digits) > 1
-    number = int(digits, 8 if octal else 0)
-    signs = (False,) if "u" in suffix else (True,) if digits.isdigit() and not octal else (True, False)
-    forms = []
-    for widths in ((TARGET_INT, 32, 64), (HOST_INT, 64, 64)):
-        possible = [Form(bits, signed) for bits in widths[suffix.count("l") :] for signed in signs]
-        forms.append(next((form for form in possible if number <= form.ends[1]), possible[-1]))
-    return Value(Int(*forms), number, number)
+    return any_of(found) if isinstance(found, Int) else found
