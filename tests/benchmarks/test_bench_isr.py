@@ -194,8 +194,8 @@ def test_each_machine_judges_the_form_that_is_fastest_there():
 def test_the_whole_interrupt_is_counted_from_its_first_instruction(example_compensator, tmp_path):
     """With a new sample it takes the law's instructions more; either takes the same for every input."""
     controlled = with_current(example_compensator)
-    some = [each for each in tried_inputs(example_compensator) if each[0] <= 4095][::40]
+    some = [each for each in tried_inputs(example_compensator) if max(each) <= 4095][::40]
     held = count_interrupt(controlled, some, tmp_path / "held", fresh=False)
     fresh = count_interrupt(controlled, some, tmp_path / "fresh", fresh=True)
-    assert held.least == held.most <= 160
-    assert held.most + 60 < fresh.least == fresh.most <= 280
+    assert held.least == held.most <= 200
+    assert held.most + 60 < fresh.least == fresh.most <= 360

@@ -25,7 +25,7 @@ from tests.support.evidence import evidence_with
 from tests.support.synthetic import needs_compiler
 
 pytestmark = needs_compiler
-BOARD = ["dz_board.c", "dz_tick.h", "main.c", "mps2_an386.ld", "startup.c"]
+BOARD = ["dz_board.c", "dz_board.h", "main.c", "mps2_an386.ld", "startup.c"]
 PROJECT = "f28335/dzdesign.projectspec"
 needs_arm = pytest.mark.skipif(shutil.which("arm-none-eabi-gcc") is None, reason="apt install gcc-arm-none-eabi")
 
@@ -41,7 +41,7 @@ def cortex(compensator, tmp_path):
     return tmp_path / "firmware"
 
 
-def fill_in(folder, name="cortex_m4/dz_board.c", old="return dz_board_u_adc;", new="return 7u;"):
+def fill_in(folder, name="cortex_m4/dz_board.c", old="codes[0] = dz_board_u_adc;", new="codes[0] = 7u;"):
     text = (folder / name).read_text()
     assert old in text
     (folder / name).write_text(text.replace(old, new))
@@ -119,7 +119,7 @@ def test_what_was_filled_in_is_not_lost_to_another_target(compensator, cortex, w
     fill_in(cortex)
     with wording.refusal(InputError):
         write_generated(generate(compensator, "host"), cortex)
-    assert "return 7u;" in (cortex / "cortex_m4/dz_board.c").read_text()
+    assert "codes[0] = 7u;" in (cortex / "cortex_m4/dz_board.c").read_text()
 
 
 def test_so_does_one_whose_drive_is_not_mounted_and_one_that_nobody_edited_yet(compensator, cortex, tmp_path, wording):

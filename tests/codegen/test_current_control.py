@@ -83,7 +83,7 @@ def test_the_project_builds_without_a_warning_and_its_selftest_holds(controlled,
     printed = done.stdout + done.stderr
     assert done.returncode == 0, printed
     assert "warning" not in printed
-    assert "99 interrupts, compare values of dz_current_tick()" in printed
+    assert "197 interrupts, compare values of dz_current_tick()" in printed
 
 
 def test_a_target_without_current_control_is_refused(controlled):

@@ -155,7 +155,7 @@ def test_an_edited_valve_json_is_named_when_it_is_read(example_valve, tmp_path, 
 FILLED_IN = {
     "f28335": {PROJECT: ("C:/ti/c2000/C2000Ware_26_01_00_00", "D:/ti/C2000Ware_5_04")},
     "cortex-m4": {
-        "cortex_m4/dz_tick.h": ("UINT32_C(9999)", "6399u"),
+        "cortex_m4/dz_board.h": ("UINT32_C(9999)", "6399u"),
         "cortex_m4/mps2_an386.ld": ("LENGTH = 4M", "LENGTH = 512K"),
     },
     "host": {},

@@ -1,8 +1,8 @@
 /* Written by dzdesign 1.0.0 from template main.c.jinja. Yours to edit: `dzdesign codegen` keeps what */
 /* you change here, and `dzdesign verify` names this file as yours. */
 
-#include "dz_board.h"
-#include "dz_tick.h"
+#include "dz_hardware.h"
+#include "dz_isr.h"
 
 /* Every exception but SysTick ends here, from startup.c: the valve is de-energised, and your watchdog resets the chip. */
 void dz_fault(void);
@@ -11,15 +11,17 @@ void dz_fault(void)
 {
     for (;;)
     {
-        dz_board_write_compare(0u, 0u);
+        dz_trip_output();
     }
 }
 
 int main(void)
 {
-    uint32_t ticks_seen = 0u;
+    uint16_t ticks_seen = 0u;
 
-    dz_tick_start();
+    dz_hardware_init();
+    dz_isr_init(0u); /* or a bit of yours, such as after a reset by the watchdog: then the output stays tripped */
+    dz_interrupt_init();
     for (;;)
     {
         if (dz_state.ticks != ticks_seen)

@@ -2,20 +2,26 @@
 /* Compensator SHA-256: d3d5a4a951e9dd70eb4ba4043e78a74f5999662c390903eff984d92383f2d9e4 */
 /* Valve identified from: synthetic_1.csv, synthetic_3.csv, synthetic_5.csv, synthetic_minus_1.csv and 2 more */
 
-/* In QEMU, in place of main.c and dz_board.c: hashes of the core's results (dz_selftest.h), then 25 and more real
- * interrupts on a board in memory. Output and exit by semihosting (ARM IHI 0100: SYS_WRITE0, SYS_EXIT); on a chip without a
- * debugger its breakpoint instruction is a fault. */
+/* In QEMU, in place of main.c and dz_board.c: hashes of the core's results (dz_selftest.h), then real interrupts on a
+ * board in memory: their compare values, and a converter that ends. Output and exit by semihosting (ARM IHI 0100: SYS_WRITE0,
+ * SYS_EXIT); on a chip without a debugger its breakpoint instruction is a fault. */
 #include "dz_selftest.h"
 
 #include "dz_board.h"
 #include "dz_drive.h"
-#include "dz_tick.h"
+#include "dz_hardware.h"
+#include "dz_isr.h"
 
 #define SYS_WRITE0 0x04u
 #define SYS_EXIT 0x18u
 #define STOPPED_APPLICATION_EXIT 0x20026u
 #define STOPPED_RUN_TIME_ERROR 0x20023u
 #define TICKS 31u
+
+/* SysTick of the ARMv7-M architecture (DDI 0403, B3.3). */
+#define SYST_CSR (*(volatile uint32_t *)0xE000E010u)
+#define SYST_RVR (*(volatile uint32_t *)0xE000E014u)
+#define SYST_CVR (*(volatile uint32_t *)0xE000E018u)
 
 /* Well above zero command, whether zero stands at the range's end or in its middle. */
 #define COMMAND ((uint16_t)(DZ_ADC_CODE_MAX - (DZ_ADC_CODE_MAX / 8u)))
@@ -28,9 +34,11 @@ static uint16_t command_at(uint32_t tick)
     return (tick < 6u) ? (uint16_t)DZ_DRIVE_COMMAND_ZERO : COMMAND;
 }
 
+/* By interrupt; what is written after the last one counts too. */
 static volatile uint16_t written_a[TICKS + 1u];
 static volatile uint16_t written_b[TICKS + 1u];
-static volatile uint32_t writes;
+static volatile uint32_t interrupts;
+static volatile uint16_t tripped = 1u;
 
 static void semihosting(uint32_t operation, uint32_t argument)
 {
@@ -61,54 +69,81 @@ void dz_fault(void)
     leave(STOPPED_RUN_TIME_ERROR);
 }
 
-uint16_t dz_board_read_command(void)
+static uint32_t place(void)
 {
-    return command_at(dz_state.ticks);
+    return (interrupts < TICKS) ? interrupts : TICKS;
 }
 
-uint16_t dz_board_read_pressure_a(void)
+/* A sample when it is due, until the converter ends. */
+uint16_t dz_read_sample(uint16_t codes[DZ_SAMPLE_CODES])
 {
-    return PRESSURE_A;
+    codes[0] = command_at(interrupts);
+    codes[1] = PRESSURE_A;
+    codes[2] = PRESSURE_B;
+    return ((interrupts < TICKS) && ((interrupts % DZ_DRIVE_TICKS_PER_SAMPLE) == 0u)) ? 1u : 0u;
 }
 
-uint16_t dz_board_read_pressure_b(void)
+void dz_write_compare_a(uint16_t compare)
 {
-    return PRESSURE_B;
+    written_a[place()] = compare;
 }
 
-void dz_board_write_compare(uint16_t compare_a, uint16_t compare_b)
+void dz_write_compare_b(uint16_t compare)
 {
-    if (writes <= TICKS)
-    {
-        written_a[writes] = compare_a;
-        written_b[writes] = compare_b;
-    }
-    writes++;
+    written_b[place()] = compare;
 }
 
+void dz_trip_output(void)
+{
+    tripped = 1u;
+}
+
+void dz_untrip_output(void)
+{
+    tripped = 0u;
+}
+
+uint16_t dz_output_tripped(void)
+{
+    return tripped;
+}
+
+uint16_t dz_trip_inputs_high(void)
+{
+    return 1u;
+}
+
+void dz_interrupt_done(void)
+{
+    interrupts++;
+}
+
+/* What the interrupts must have written, and that the output was in use to the end. */
 static uint32_t interrupts_answer(void)
 {
     struct dz_drive drive;
-    uint32_t same;
+    uint32_t released = 0u;
+    uint32_t same = 1u;
     uint32_t tick;
 
-    dz_tick_start();
-    while (dz_state.ticks < TICKS)
-    {
-    }
-    /* The valve is de-energised before the first sample, and each tick writes once. */
-    same = ((writes > TICKS) && (written_a[0] == 0u) && (written_b[0] == 0u)) ? 1u : 0u;
     dz_drive_init(&drive);
     for (tick = 0u; tick < TICKS; tick++)
     {
-        if ((tick % DZ_DRIVE_TICKS_PER_SAMPLE) == 0u)
+        const uint32_t fresh = ((tick % DZ_DRIVE_TICKS_PER_SAMPLE) == 0u) ? 1u : 0u;
+
+        released |= fresh;
+        if (released != 0u)
         {
-            dz_drive_sample(&drive, command_at(tick), PRESSURE_A, PRESSURE_B);
+            if (fresh != 0u)
+            {
+                dz_drive_sample(&drive, command_at(tick), PRESSURE_A, PRESSURE_B);
+            }
+            dz_drive_tick(&drive);
+            same &= ((written_a[tick] == drive.compare_a) && (written_b[tick] == drive.compare_b)) ? 1u : 0u;
         }
-        dz_drive_tick(&drive);
-        if ((written_a[tick + 1u] != drive.compare_a) || (written_b[tick + 1u] != drive.compare_b))
+        else
         {
-            same = 0u;
+            same &= ((written_a[tick] == 0u) && (written_b[tick] == 0u)) ? 1u : 0u;
         }
     }
     return ((drive.compare_a != 0u) || (drive.compare_b != 0u)) ? same : 0u;
@@ -124,12 +159,24 @@ int main(void)
         dz_selftest_line(test, line);
         print(line);
     }
+    dz_isr_init(0u);
+    SYST_RVR = DZ_TICK_RELOAD;
+    SYST_CVR = 0u; /* any write clears it */
+    SYST_CSR = 7u; /* the processor's clock, with interrupts */
+    while (interrupts < (TICKS + DZ_SAMPLE_TIMEOUT_TICKS + 1u))
+    {
+    }
     if (interrupts_answer() == 0u)
     {
-        print("dz_tick: wrong compare values\n");
+        print("dz_isr: wrong compare values\n");
         leave(STOPPED_RUN_TIME_ERROR);
     }
-    print("dz_tick: 31 interrupts, compare values of dz_drive_tick()\n");
+    if ((dz_state.fault != DZ_FAULT_NO_SAMPLE) || (tripped == 0u) || (written_a[TICKS] != 0u) || (written_b[TICKS] != 0u))
+    {
+        print("dz_isr: no trip without samples\n");
+        leave(STOPPED_RUN_TIME_ERROR);
+    }
+    print("dz_isr: 31 interrupts, compare values of dz_drive_tick(); tripped without samples\n");
     leave(STOPPED_APPLICATION_EXIT);
     return 0;
 }

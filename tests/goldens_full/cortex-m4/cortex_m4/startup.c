@@ -4,7 +4,7 @@
 /* From reset to main(), in C: on ARMv7-M the processor loads the stack pointer itself (DDI 0403, B1.5.3). */
 #include <stdint.h>
 
-#include "dz_tick.h"
+#include "dz_isr.h"
 
 /* Symbols that the linker script defines; only their addresses have a meaning. */
 extern uint32_t dz_stack_top;
@@ -43,7 +43,7 @@ __attribute__((section(".vectors"), used)) const struct dz_vectors dz_vectors = 
         dz_fault, /* 12 debug monitor */
         dz_fault, /* 13 reserved */
         dz_fault, /* 14 pendable service call */
-        dz_tick,  /* 15 SysTick */
+        dz_isr,   /* 15 SysTick */
     },
 };
 
