@@ -103,12 +103,8 @@ class Certificate:
     proofs: tuple[Proof, ...]
 
 
-def certify(
-    scatter: Scatter, curves: CurveClass, *, confidence: float = 0.99, unknown_drift: float = 0.0
-) -> Certificate:
+def certify(scatter: Scatter, curves: CurveClass, *, confidence: float = 0.99) -> Certificate:
     """Certify the next closing (or opening) of a branch.
-
-    `unknown_drift` is the largest drift over the series, V, that the order of the ramps can't tell.
 
     Raises
     ------
@@ -116,7 +112,7 @@ def certify(
         If no threshold of the class agrees with the data.
     """
     criticals = find_criticals(scatter, curves.kind, 1 - confidence)
-    data = data_sets(scatter, curves.grid_MPa, criticals, unknown_drift)
+    data = data_sets(scatter, curves.grid_MPa, criticals)
     bound, proofs = np.full(curves.grid_MPa.size, np.inf), list[Proof]()
     refused: NoCurveAgreesError | None = None
     for each in one_way(curves):
@@ -301,15 +297,10 @@ def find_criticals(scatter: Scatter, kind: Kind, error: float) -> Criticals:
     )
 
 
-def data_sets(
-    scatter: Scatter, grid_MPa: np.ndarray, criticals: Criticals, unknown_drift: float = 0.0
-) -> tuple[DataSet, ...]:
+def data_sets(scatter: Scatter, grid_MPa: np.ndarray, criticals: Criticals) -> tuple[DataSet, ...]:
     """Return what is known of the next closing in each state of the valve."""
     unlike, ramps = scatter.unlike, scatter.model.ramps
     at = broken_line(ramps.dp_MPa, grid_MPa)
-    clock = np.zeros(ramps.y.size) if ramps.clock is None else ramps.clock
-    budget = np.zeros(ramps.y.size) if ramps.budget is None else ramps.budget
-    unknown = 0.0 if scatter.model.drift else unknown_drift
     found = []
     for state in states_of(scatter):
         each = contrasts(scatter, state)
@@ -322,7 +313,7 @@ def data_sets(
             low[unlike.knot], high[unlike.knot] = criticals.floor_unlike or 0.0, criticals.roof_unlike or 0.0
         sd = np.sqrt(next_one + each**2 @ scatter.of_ramps)
         middle = each @ ramps.y
-        wide = unknown * (0.5 + np.abs(each @ clock)) + np.abs(each) @ budget + ramps.shared
+        wide = np.abs(each) @ ramps.budgets + ramps.shared
         roof = np.full(len(each), np.inf) if criticals.roof is None else middle + high * sd + wide
         found.append(DataSet(state=state, rows=each @ at, floor=middle - low * sd - wide, roof=roof))
     return tuple(found)
@@ -377,13 +368,7 @@ class AboveBound:
     certified: bool = True
 
 
-def continue_above(
-    scatter: Scatter,
-    certificate: Certificate,
-    *,
-    confidence: float = 0.99,
-    unknown_drift: float = 0.0,
-) -> AboveBound | None:
+def continue_above(scatter: Scatter, certificate: Certificate, *, confidence: float = 0.99) -> AboveBound | None:
     """Continue the bound above the last test; None where nothing is known between the tests either.
 
     A threshold that rises, as far as is known, stays; one that may fall goes on with the steepest slope between two
@@ -408,7 +393,7 @@ def continue_above(
         )
     found = []
     for start in range(knots.size - 1):
-        band, value = _band_above(scatter, curves, start, nodes, confidence, unknown_drift)
+        band, value = _band_above(scatter, curves, start, nodes, confidence)
         # Between two tests and beyond them it bends no more than in the outermost interval and those that count.
         sag = _bend_above(curves, knots, start) / 2 * (nodes - last) * (nodes - knots[start])
         taken_off = float(np.interp(CHOSEN_AT * last, nodes, band + sag))
@@ -435,18 +420,11 @@ def _bend_above(curves: CurveClass, knots_MPa: np.ndarray, start: int) -> float:
 
 
 def _band_above(
-    scatter: Scatter,
-    curves: CurveClass,
-    start: int,
-    nodes: np.ndarray,
-    confidence: float,
-    unknown_drift: float,
+    scatter: Scatter, curves: CurveClass, start: int, nodes: np.ndarray, confidence: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return by what errors take off the threshold continued to the nodes, and that, V: the least of all states."""
     model = scatter.model
     ramps = model.ramps
-    clock = np.zeros(ramps.y.size) if ramps.clock is None else ramps.clock
-    budget = np.zeros(ramps.y.size) if ramps.budget is None else ramps.budget
     share = ((nodes - nodes[0]) / (model.knots_MPa[-1] - model.knots_MPa[start]))[:, None]
     by_state = []
     for state in states_of(scatter):
@@ -460,15 +438,9 @@ def _band_above(
     variances = scatter.of_ramps
     factor = critical(np.vstack(by_state) * np.sqrt(variances / scatter.variance), degrees, scatter.share, tail)
     most = scatter.variance if scatter.unlike is None else max(scatter.unlike.variance, scatter.variance)
-    unknown = 0.0 if model.drift else unknown_drift
-    lows = [
-        (
-            factor * np.sqrt(scatter.share * most + each**2 @ variances)
-            + unknown * (0.5 + np.abs(each @ clock)) + np.abs(each) @ budget + ramps.shared,
-            each @ ramps.y,
-        )
-        for each in by_state
-    ]  # fmt: skip
-    lowest = np.min([value - band for band, value in lows], axis=0)
-    band = lows[0][1] - lowest
-    return band, lows[0][1]
+    lows = []
+    for each in by_state:
+        error = factor * np.sqrt(scatter.share * most + each**2 @ variances)
+        lows.append(each @ ramps.y - error - np.abs(each) @ ramps.budgets - ramps.shared)
+    value = by_state[0] @ ramps.y
+    return value - np.min(lows, axis=0), value

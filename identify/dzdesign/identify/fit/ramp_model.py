@@ -39,6 +39,11 @@ class Ramps:
     #: What they may move all thresholds by together, V: the meter's lag does.
     shared: float = 0.0
 
+    @property
+    def budgets(self) -> np.ndarray:
+        """What systematic errors may move each threshold by, either way, V (n,)."""
+        return np.zeros(self.y.size) if self.budget is None else self.budget
+
     def only(self, kept: np.ndarray) -> "Ramps":
         """Return those ramps alone, of a mask (n,)."""
         parts = {name: getattr(self, name) for name in ("dp_MPa", "y", "se", "clock", "budget")}

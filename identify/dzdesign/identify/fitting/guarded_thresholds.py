@@ -280,8 +280,6 @@ def _mean_of(group: DescribedTests, opening: GuardedThreshold, closing: GuardedT
         [(place[source], at) for at, source in enumerate(closing.sources) if source in place], dtype=int
     ).reshape(-1, 2).T  # fmt: skip
     up, down = opening.ramps, closing.ramps
-    if up.budget is None or down.budget is None:
-        raise ValueError("ramps without a budget have no mean")
     least_sd = max(opening.least_sd, closing.least_sd)
     if set(closing.test[falling]) != set(closing.test):  # no ramp tells both branches: each test counts as one
         rows = np.arange(threshold.value.size)
@@ -300,7 +298,7 @@ def _mean_of(group: DescribedTests, opening: GuardedThreshold, closing: GuardedT
     credit = (opening.threshold.lag_budget + closing.threshold.lag_budget) / 2 - threshold.lag_budget
     credit = credit + shared - (up.shared + down.shared) / 2
     test = closing.test[falling]
-    budget = np.maximum((up.budget[rising] + down.budget[falling]) / 2 - credit[test], 0.0)
+    budget = np.maximum((up.budgets[rising] + down.budgets[falling]) / 2 - credit[test], 0.0)
     ramps = Ramps(
         dp_MPa=down.dp_MPa[falling],
         y=np.round((up.y[rising] + down.y[falling]) / 2, DECIMALS),
