@@ -77,7 +77,8 @@ def test_offset_passes_no_more_than_a_declared_flow(valve, tmp_path):
         known = truth[test["source"].removesuffix(".csv.gz")]["pos"]["u_falling_Q1.0"]
         assert test["zero_flow_L_min"] == 1.0
         assert test["u_guard_V"] == pytest.approx(known, abs=0.015)
-        assert known - 0.2 < test["u_guard_lower_V"] < known
+        # Of E at 0.5 MPa the line errs by 7.5 mV, at 5 MPa by 3.3 mV, and with no scatter that is the whole of it.
+        assert known - 0.22 < test["u_guard_lower_V"] < known
 
 
 def test_measured_valve_without_pressure_is_one_pressure_and_says_so(tmp_path, capsys):

@@ -191,12 +191,12 @@ def _recorded_drop(described: tuple[DescribedTest, ...]) -> RecordedDrop | None:
 
 def _repeatability(found: Scatter, tests: int) -> Repeatability:
     model = found.model
-    drift_se = math.sqrt(found.variance * float(np.sum(model.weights[-1] ** 2))) if model.drift else None
+    drift_se = math.sqrt(float(model.weights[-1] ** 2 @ found.of_ramps)) if model.drift else None
     no_drift: NoDrift = "order unknown" if model.ramps.clock is None else "order of pressure"
     if model.drift or tests == 1:
         no_drift = "" if model.drift else "one pressure drop"
     return Repeatability(
-        sd_V=math.sqrt(found.variance if found.origin == "repeats" else max(found.variance - found.noise, 0.0)),
+        sd_V=math.sqrt(found.variance if found.origin == "repeats" else model.scatter),
         origin=found.origin,
         degrees_of_freedom=found.degrees if found.origin == "repeats" else None,
         drift_V=model.drift_V,

@@ -222,6 +222,16 @@ def test_of_one_test_the_critical_value_is_student_s():
         assert found == pytest.approx(law.isf(0.0075), rel=0.02)
 
 
+def test_of_two_single_ramps_each_bound_is_as_sure_as_its_own_error():
+    """With one mean error for both, 2.9 % of the bounds at the ramp with 39 mV lay above the truth."""
+    truth, se = np.array([5.2, 5.0]), np.array([39e-3, 10e-3])
+    scatter = measure_scatter(Ramps(dp_MPa=np.array([1.0, 4.0]), y=truth, se=se), declared=0.0, assumed=ASSUMED)
+    margin = truth - certify(scatter, find_class(scatter, curve=None, curvature=None)).bound
+    assert margin[0] / margin[1] == pytest.approx(3.9)
+    above = se * np.random.default_rng(1).standard_normal((20_000, 2)) > margin
+    assert np.mean(above.any(axis=1)) < 0.01 and np.mean(above[:, 0]) > 1e-3
+
+
 def test_what_all_ramps_have_in_common_is_taken_off_once():
     ramps = ramps_of("line", drift=True)
     free, shared = (scatter_of(each) for each in (ramps, replace(ramps, shared=0.02)))

@@ -253,6 +253,22 @@ def test_a_column_that_ends_before_the_others_is_refused(read, blank):
         read(csv(**blank))
 
 
+@pytest.mark.parametrize("again", [1, 2])
+@pytest.mark.parametrize("label", ["u_V", "dP_MPa", "Q_Lmin"])
+def test_a_value_in_the_last_rows_of_a_column_that_ended_is_no_reason_to_read_it(read, label, again):
+    """Seeded: a threshold was 83 mV above the truth, without a word."""
+    whole = [line.split(",") for line in csv().decode().splitlines()]
+    for line in whole[-30:-again]:
+        line[whole[0].index(label)] = ""
+    with pytest.raises(InputError, match=f"'{label}' ends at row .*, 30 rows .* before the"):
+        read("\n".join(map(",".join, whole)).encode())
+
+
+def test_rows_that_are_blank_in_all_columns_end_none(read):
+    whole = csv().decode().splitlines()
+    assert read("\n".join([*whole[:-30], *([",,,"] * 28), *whole[-2:]]).encode()).rows_read == 1372
+
+
 def test_of_two_solenoids_either_may_end_before_the_others(read):
     whole = [f"{line},0" for line in csv().decode().splitlines()]
     lines = [whole[0].replace("u_V", "uA_V")[:-1] + "uB_V", *whole[1:-9], *(line[:-1] for line in whole[-9:])]

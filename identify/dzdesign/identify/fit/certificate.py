@@ -20,7 +20,7 @@ from functools import lru_cache
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.fit.curve_class import CurveClass, Kind, one_way, scatter_of_ramps
+from dzdesign.identify.fit.curve_class import CurveClass, Kind, one_way
 from dzdesign.identify.fit.ramp_model import broken_line
 from dzdesign.identify.fit.scatter import Scatter
 
@@ -103,12 +103,8 @@ class Certificate:
     proofs: tuple[Proof, ...]
 
 
-def certify(
-    scatter: Scatter, curves: CurveClass, *, confidence: float = 0.99, unknown_drift: float = 0.0
-) -> Certificate:
+def certify(scatter: Scatter, curves: CurveClass, *, confidence: float = 0.99) -> Certificate:
     """Certify the next closing (or opening) of a branch.
-
-    `unknown_drift` is the largest drift over the series, V, that the order of the ramps can't tell.
 
     Raises
     ------
@@ -116,7 +112,7 @@ def certify(
         If no threshold of the class agrees with the data.
     """
     criticals = find_criticals(scatter, curves.kind, 1 - confidence)
-    data = data_sets(scatter, curves.grid_MPa, criticals, unknown_drift)
+    data = data_sets(scatter, curves.grid_MPa, criticals)
     bound, proofs = np.full(curves.grid_MPa.size, np.inf), list[Proof]()
     refused: NoCurveAgreesError | None = None
     for each in one_way(curves):
@@ -250,17 +246,23 @@ def contrasts(scatter: Scatter, state: float) -> np.ndarray:
     """
     model = scatter.model
     count, dp = model.knots_MPa.size, model.ramps.dp_MPa
-    rows = [model.weights[:count] + (state * model.weights[count] if model.drift else 0.0)]
+    rows = [model.at_knots(state)]
     if count == 1 or scatter.unlike is not None:
         return rows[0]
     rows += [rows[0][at - 1 : at + 2].mean(axis=0, keepdims=True) for at in range(1, count - 1)]
-    clock = [model.ramps.clock] if model.drift and model.ramps.clock is not None else []
-    at = np.array([[1, each, *([state] * len(clock))] for each in (dp.min(), dp.mean(), dp.max())])
-    rows.append(at @ np.linalg.pinv(np.column_stack([np.ones(dp.size), dp, *clock])))
+    rows.append(line_at(scatter, np.array([dp.min(), dp.mean(), dp.max()]), state))
     every = np.vstack(rows)
     # Of two tests the line's ends are the tests themselves: which of two equal rows proves a bound is no one's choice.
     new = [not np.any(np.all(np.abs(every[:row] - every[row]) < SMALLEST, axis=1)) for row in range(len(every))]
     return every[new]
+
+
+def line_at(scatter: Scatter, dp_MPa: np.ndarray, state: float) -> np.ndarray:
+    """Return the weights (T, n) of the ramps in a straight line through all of them, at pressure drops (T,)."""
+    model = scatter.model
+    line = model.weigh(model.with_clock(np.column_stack([np.ones(model.ramps.y.size), model.ramps.dp_MPa])))
+    at: np.ndarray = np.column_stack([np.ones(dp_MPa.size), dp_MPa]) @ line[:2]
+    return at + state * line[2] if model.drift else at
 
 
 def states_of(scatter: Scatter) -> tuple[float, ...]:
@@ -280,12 +282,13 @@ def find_criticals(scatter: Scatter, kind: Kind, error: float) -> Criticals:
     def value(rows: np.ndarray, degrees: float, share: float, of_error: float) -> float:
         return critical(rows, degrees, share, of_error * error / parts)
 
-    every = np.vstack(weights)
+    every = np.vstack(weights) * np.sqrt(scatter.of_ramps / scatter.variance)
     floor = value(every, scatter.degrees, scatter.share, floors)
     roof = None if alone else value(every, scatter.degrees, scatter.share, ROOFS)
     if unlike is None:
         return Criticals(floor=floor, roof=roof)
-    rows = np.vstack([each[unlike.knot] for each in weights])
+    of_ramps = np.sqrt(scatter.of_ramps / max(unlike.variance, scatter.variance))
+    rows = np.vstack([each[unlike.knot] for each in weights]) * of_ramps
     return Criticals(
         floor=floor,
         roof=roof,
@@ -294,15 +297,10 @@ def find_criticals(scatter: Scatter, kind: Kind, error: float) -> Criticals:
     )
 
 
-def data_sets(
-    scatter: Scatter, grid_MPa: np.ndarray, criticals: Criticals, unknown_drift: float = 0.0
-) -> tuple[DataSet, ...]:
+def data_sets(scatter: Scatter, grid_MPa: np.ndarray, criticals: Criticals) -> tuple[DataSet, ...]:
     """Return what is known of the next closing in each state of the valve."""
     unlike, ramps = scatter.unlike, scatter.model.ramps
     at = broken_line(ramps.dp_MPa, grid_MPa)
-    clock = np.zeros(ramps.y.size) if ramps.clock is None else ramps.clock
-    budget = np.zeros(ramps.y.size) if ramps.budget is None else ramps.budget
-    unknown = 0.0 if scatter.model.drift else unknown_drift
     found = []
     for state in states_of(scatter):
         each = contrasts(scatter, state)
@@ -313,9 +311,9 @@ def data_sets(
         if unlike is not None:
             next_one[unlike.knot] = max(unlike.variance, scatter.variance)
             low[unlike.knot], high[unlike.knot] = criticals.floor_unlike or 0.0, criticals.roof_unlike or 0.0
-        sd = np.sqrt(next_one + each**2 @ scatter_of_ramps(scatter))
+        sd = np.sqrt(next_one + each**2 @ scatter.of_ramps)
         middle = each @ ramps.y
-        wide = unknown * (0.5 + np.abs(each @ clock)) + np.abs(each) @ budget + ramps.shared
+        wide = np.abs(each) @ ramps.budgets + ramps.shared
         roof = np.full(len(each), np.inf) if criticals.roof is None else middle + high * sd + wide
         found.append(DataSet(state=state, rows=each @ at, floor=middle - low * sd - wide, roof=roof))
     return tuple(found)
@@ -324,7 +322,7 @@ def data_sets(
 def critical(weights: np.ndarray, degrees: float, share: float, tail: float) -> float:
     """Return the standard deviations that the largest error of these sums exceeds with that probability.
 
-    One next closing, with `share` of a ramp's variance, is common to all of them.
+    The weights are of ramps whose variance is 1. One next closing, with `share` of that, is common to all sums.
     """
     rounded = weights.round(9) + 0.0
     in_order = np.ascontiguousarray(rounded[:, np.lexsort(rounded)])  # whatever order the ramps came in
@@ -346,11 +344,17 @@ def _critical(weights: bytes, shape: tuple[int, int], degrees: float, share: flo
 @lru_cache(maxsize=8)
 def _largest_errors(weights: bytes, shape: tuple[int, int], share: float) -> np.ndarray:
     """Return the largest error of each draw, in its standard deviations; of all sums the ramps and the next closing."""
-    rng, rows = np.random.default_rng(SEED), np.frombuffer(weights).reshape(shape)
-    of_ramps, of_next = rng.standard_normal((DRAWS, shape[1])), rng.standard_normal((DRAWS, 1))
+    rows, (of_ramps, of_next) = np.frombuffer(weights).reshape(shape), _draws(shape[1])
     errors = of_ramps @ rows.T - np.sqrt(share) * of_next
     largest: np.ndarray = (errors / np.sqrt(share + np.sum(rows**2, axis=1))).max(axis=1)
     return largest
+
+
+@lru_cache(maxsize=4)
+def _draws(ramps: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the errors of so many ramps and of the next closing in all draws, in their standard deviations."""
+    rng = np.random.default_rng(SEED)
+    return rng.standard_normal((DRAWS, ramps)), rng.standard_normal((DRAWS, 1))
 
 
 # --------------------------------------------------------------------------------------------------- above the tests
@@ -364,13 +368,7 @@ class AboveBound:
     certified: bool = True
 
 
-def continue_above(
-    scatter: Scatter,
-    certificate: Certificate,
-    *,
-    confidence: float = 0.99,
-    unknown_drift: float = 0.0,
-) -> AboveBound | None:
+def continue_above(scatter: Scatter, certificate: Certificate, *, confidence: float = 0.99) -> AboveBound | None:
     """Continue the bound above the last test; None where nothing is known between the tests either.
 
     A threshold that rises, as far as is known, stays; one that may fall goes on with the steepest slope between two
@@ -389,13 +387,13 @@ def continue_above(
     nodes = np.round(last * np.array(steps), 7)
     if curves.kind == "monotone":
         rises = curves.direction > 0
-        slope = 0.0 if rises else min(float(np.min(np.diff(model.at_knots) / np.diff(knots))), 0.0)
+        slope = 0.0 if rises else min(float(np.min(np.diff(model.at_knots() @ model.ramps.y) / np.diff(knots))), 0.0)
         return AboveBound(
             dp_MPa=nodes, bound=certificate.bound[-1] + slope * (nodes - last), certified=rises
         )
     found = []
     for start in range(knots.size - 1):
-        band, value = _band_above(scatter, curves, start, nodes, confidence, unknown_drift)
+        band, value = _band_above(scatter, curves, start, nodes, confidence)
         # Between two tests and beyond them it bends no more than in the outermost interval and those that count.
         sag = _bend_above(curves, knots, start) / 2 * (nodes - last) * (nodes - knots[start])
         taken_off = float(np.interp(CHOSEN_AT * last, nodes, band + sag))
@@ -422,41 +420,27 @@ def _bend_above(curves: CurveClass, knots_MPa: np.ndarray, start: int) -> float:
 
 
 def _band_above(
-    scatter: Scatter,
-    curves: CurveClass,
-    start: int,
-    nodes: np.ndarray,
-    confidence: float,
-    unknown_drift: float,
+    scatter: Scatter, curves: CurveClass, start: int, nodes: np.ndarray, confidence: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return by what errors take off the threshold continued to the nodes, and that, V: the least of all states."""
     model = scatter.model
-    ramps, count = model.ramps, model.knots_MPa.size
-    clock = np.zeros(ramps.y.size) if ramps.clock is None else ramps.clock
-    budget = np.zeros(ramps.y.size) if ramps.budget is None else ramps.budget
+    ramps = model.ramps
     share = ((nodes - nodes[0]) / (model.knots_MPa[-1] - model.knots_MPa[start]))[:, None]
     by_state = []
     for state in states_of(scatter):
         if curves.kind == "line":
-            columns = [np.ones(ramps.y.size), ramps.dp_MPa, *([clock] if model.drift else [])]
-            at = np.column_stack([np.ones(nodes.size), nodes, *([np.full(nodes.size, state)] if model.drift else [])])
-            by_state.append(at @ np.linalg.pinv(np.column_stack(columns)))
+            by_state.append(line_at(scatter, nodes, state))
             continue
-        rows = model.weights[:count] + (state * model.weights[count] if model.drift else 0.0)
+        rows = model.at_knots(state)
         by_state.append(rows[-1] + share * (rows[-1] - rows[start]))
     tail = ABOVE * (1 - confidence)
     degrees = min(scatter.degrees, scatter.unlike.degrees) if scatter.unlike else scatter.degrees
-    factor = critical(np.vstack(by_state), degrees, scatter.share, tail)
-    variances = scatter_of_ramps(scatter)
-    unknown = 0.0 if model.drift else unknown_drift
-    lows = [
-        (
-            factor * np.sqrt(scatter.share * variances.max() + each**2 @ variances)
-            + unknown * (0.5 + np.abs(each @ clock)) + np.abs(each) @ budget + ramps.shared,
-            each @ ramps.y,
-        )
-        for each in by_state
-    ]  # fmt: skip
-    lowest = np.min([value - band for band, value in lows], axis=0)
-    band = lows[0][1] - lowest
-    return band, lows[0][1]
+    variances = scatter.of_ramps
+    factor = critical(np.vstack(by_state) * np.sqrt(variances / scatter.variance), degrees, scatter.share, tail)
+    most = scatter.variance if scatter.unlike is None else max(scatter.unlike.variance, scatter.variance)
+    lows = []
+    for each in by_state:
+        error = factor * np.sqrt(scatter.share * most + each**2 @ variances)
+        lows.append(each @ ramps.y - error - np.abs(each) @ ramps.budgets - ramps.shared)
+    value = by_state[0] @ ramps.y
+    return value - np.min(lows, axis=0), value

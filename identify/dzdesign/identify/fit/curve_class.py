@@ -132,21 +132,12 @@ def _estimated(scatter: Scatter) -> CurveClass:
     """Return the class that the bends from test to test give; a change is the fitted one and half its error, or one."""
     model = scatter.model
     gap = np.diff(model.knots_MPa)
-    weights = np.diff(np.diff(model.weights[: model.knots_MPa.size], axis=0) / gap[:, None], axis=0)
+    weights = np.diff(np.diff(model.at_knots(), axis=0) / gap[:, None], axis=0)
     found = weights @ model.ramps.y
-    error = np.sqrt(np.sum(weights**2 * scatter_of_ramps(scatter), axis=1))
+    error = np.sqrt(np.sum(weights**2 * scatter.of_ramps, axis=1))
     # Slopes of the chords that change downwards and upwards by at most so much, V/MPa.
     change = np.array([np.maximum(sign * found + error / 2, error) for sign in (-1, 1)])
     return class_of_bends(model.knots_MPa, make_grid(model.knots_MPa, model.ramps.dp_MPa), change)
-
-
-def scatter_of_ramps(scatter: Scatter) -> np.ndarray:
-    """Return the variance of each ramp, V² (n,): that of its knot where it scatters unlike the others."""
-    if scatter.unlike is None:
-        return np.full(scatter.model.ramps.y.size, scatter.variance)
-    unlike = max(scatter.unlike.variance, scatter.variance)
-    found: np.ndarray = np.where(scatter.model.knot == scatter.unlike.knot, unlike, scatter.variance)
-    return found
 
 
 def class_of_bends(knots_MPa: np.ndarray, grid_MPa: np.ndarray, change: np.ndarray) -> CurveClass:
@@ -193,11 +184,11 @@ def lack_of_fit(scatter: Scatter, *, curve: Kind, curvature: float | None, direc
     from scipy.special import fdtrc, stdtr
 
     model = scatter.model
-    knots, weights = model.knots_MPa, model.weights[: model.knots_MPa.size]
+    knots, weights = model.knots_MPa, model.at_knots()
     if knots.size < FEWEST_FOR_BENDS:
         return None
     values, degrees = weights @ model.ramps.y, min(scatter.degrees, LARGEST_DEGREES)
-    covariance = (weights * scatter_of_ramps(scatter)) @ weights.T
+    covariance = (weights * scatter.of_ramps) @ weights.T
     if curve == "line":
         line = np.column_stack([np.ones(knots.size), knots])
         inverse = np.linalg.inv(covariance)

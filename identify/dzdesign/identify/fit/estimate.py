@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.fit.curve_class import CurveClass, scatter_of_ramps
+from dzdesign.identify.fit.curve_class import CurveClass
 from dzdesign.identify.fit.ramp_model import broken_line
 from dzdesign.identify.fit.scatter import Scatter
 
@@ -59,7 +59,7 @@ def estimate_side(branches: Sequence[Scatter], curves: CurveClass) -> SideEstima
         ramps = scatter.model.ramps
         clock = ramps.clock if scatter.model.drift and ramps.clock is not None else np.zeros(ramps.y.size)
         design = np.column_stack([broken_line(ramps.dp_MPa, grid), clock])
-        weight = 1e-6 / (scatter.share * scatter.variance + ramps.se**2)
+        weight = 1e-6 / scatter.of_ramps
         cost.append((design.T @ (weight[:, None] * design), design.T @ (weight * 1e3 * (ramps.y - base))))
         lower.append(1e3 * low)
         upper.append(1e3 * high)
@@ -96,12 +96,9 @@ def covariance_of_curve(scatter: Scatter, dp_MPa: np.ndarray, *, straight: bool)
     """
     model = scatter.model
     knots = model.knots_MPa[[0, -1]] if straight and model.knots_MPa.size > 1 else model.knots_MPa
-    weights = model.weights[: model.knots_MPa.size]
-    if knots.size < model.knots_MPa.size:
-        clock = [model.ramps.clock] if model.drift and model.ramps.clock is not None else []
-        weights = np.linalg.pinv(np.column_stack([broken_line(model.ramps.dp_MPa, knots), *clock]))[:2]
+    weights = model.weigh(model.with_clock(broken_line(model.ramps.dp_MPa, knots)))[: knots.size]
     at = broken_line(dp_MPa, knots) @ weights
-    found: np.ndarray = (at * scatter_of_ramps(scatter)) @ at.T
+    found: np.ndarray = (at * scatter.of_ramps) @ at.T
     return found
 
 

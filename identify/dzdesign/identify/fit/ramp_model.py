@@ -3,8 +3,9 @@
     y[i] = f(p[i]) + d clock[i] + b[i] + e[i]
 
 has the threshold y of ramp i with its own standard error (e), the curve f, straight between knots, the clock from
--1/2 at the first ramp of the series to 1/2 at the last, and the scatter b from ramp to ramp. Knots follow from the
-pressures alone, never from a threshold, so that ramps whose pressures were set by hand keep their degrees of freedom.
+-1/2 at the first ramp of the series to 1/2 at the last, and the scatter b from ramp to ramp. A ramp weighs by the
+scatter and its own error, so that a badly measured one moves the curve little. Knots follow from the pressures alone,
+never from a threshold, so that ramps whose pressures were set by hand keep their degrees of freedom.
 """
 
 from dataclasses import dataclass, replace
@@ -18,6 +19,8 @@ OF_PRESSURE, OF_RANGE = 0.12, 0.15
 RAMPS_TO_SHARE, RAMPS_PER_KNOT = 7, 3
 #: Squares of the clock that the curve can't explain from which a drift is told: two standard deviations of a ramp.
 TELLS_DRIFT = 1 / 4
+#: Smallest standard deviation of a ramp, V: an exact table has no error.
+SMALLEST_SD = 1e-5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,6 +39,11 @@ class Ramps:
     #: What they may move all thresholds by together, V: the meter's lag does.
     shared: float = 0.0
 
+    @property
+    def budgets(self) -> np.ndarray:
+        """What systematic errors may move each threshold by, either way, V (n,)."""
+        return np.zeros(self.y.size) if self.budget is None else self.budget
+
     def only(self, kept: np.ndarray) -> "Ramps":
         """Return those ramps alone, of a mask (n,)."""
         parts = {name: getattr(self, name) for name in ("dp_MPa", "y", "se", "clock", "budget")}
@@ -51,24 +59,58 @@ class RampModel:
     knots_MPa: np.ndarray
     #: Whether the order of the ramps tells a drift.
     drift: bool
-    #: Of each ramp in the curve at the knots, and after them in the drift (K [+ 1], n).
-    weights: np.ndarray
     #: Knot that each ramp is nearest to, (n,).
     knot: np.ndarray
+    #: Variance from ramp to ramp, V²; beside an infinite one the ramps' own errors are nothing, and all weigh alike.
+    scatter: float = np.inf
+
+    @property
+    def variances(self) -> np.ndarray:
+        """Variance of each ramp by the scatter and its own error, V² (n,); 1 beside an infinite scatter."""
+        if np.isinf(self.scatter):
+            return np.ones(self.ramps.y.size)
+        return np.maximum(self.scatter + self.ramps.se**2, SMALLEST_SD**2)
+
+    @property
+    def weights(self) -> np.ndarray:
+        """Weights of the ramps in the curve at the knots, and after them in the drift (K [+ 1], n)."""
+        return self.weigh(self._basis)
 
     @property
     def projector(self) -> np.ndarray:
         """What takes thresholds to their residuals (n, n)."""
-        basis = broken_line(self.ramps.dp_MPa, self.knots_MPa)
-        if self.drift and self.ramps.clock is not None:
-            basis = np.column_stack([basis, self.ramps.clock])
-        found: np.ndarray = np.eye(self.ramps.y.size) - basis @ self.weights
+        found: np.ndarray = np.eye(self.ramps.y.size) - self._basis @ self.weights
         return found
 
     @property
-    def at_knots(self) -> np.ndarray:
-        """The curve at the knots in the middle of the series, V (K,)."""
-        found: np.ndarray = self.weights[: self.knots_MPa.size] @ self.ramps.y
+    def _basis(self) -> np.ndarray:
+        return self.with_clock(broken_line(self.ramps.dp_MPa, self.knots_MPa))
+
+    def with_clock(self, basis: np.ndarray) -> np.ndarray:
+        """Return a basis (n, C) with a column for the drift, if there is one."""
+        return np.column_stack([basis, self.ramps.clock]) if self.drift and self.ramps.clock is not None else basis
+
+    def weigh(self, basis: np.ndarray) -> np.ndarray:
+        """Return the weights (C, n) of the ramps in the coefficients of a basis (n, C), by least squares."""
+        sd = np.sqrt(self.variances / self.variances.mean())
+        found: np.ndarray = np.linalg.pinv(basis / sd[:, None]) / sd
+        return found
+
+    @property
+    def residual(self) -> np.ndarray:
+        """What the curve and the drift leave of the thresholds, V (n,)."""
+        found: np.ndarray = self.projector @ self.ramps.y
+        return found
+
+    @property
+    def free(self) -> np.ndarray:
+        """Degrees of freedom of each residual (n,): its variance over that of the ramp."""
+        return np.diag(self.projector)
+
+    def at_knots(self, state: float = 0.0) -> np.ndarray:
+        """Return the weights of the ramps in the curve at the knots (K, n), at a place in the series."""
+        weights, count = self.weights, self.knots_MPa.size
+        found: np.ndarray = weights[:count] + (state * weights[count] if self.drift else 0.0)
         return found
 
     @property
@@ -78,16 +120,15 @@ class RampModel:
 
 
 def fit_ramp_model(ramps: Ramps, *, share_knots: bool) -> RampModel:
-    """Fit the model; `share_knots` lets ramps that stand alone share knots, where the scatter is to come from them."""
+    """Fit the model, all ramps alike; `share_knots` lets ramps that stand alone share knots, to tell their scatter."""
     knots = find_knots(ramps.dp_MPa, share=share_knots and ramps.y.size >= RAMPS_TO_SHARE)
     basis = broken_line(ramps.dp_MPa, knots)
     drift = False
     if ramps.clock is not None:
         left = ramps.clock - basis @ np.linalg.lstsq(basis, ramps.clock, rcond=None)[0]
         drift = float(left @ left) > TELLS_DRIFT
-        basis = np.column_stack([basis, ramps.clock]) if drift else basis
     nearest = np.argmin(np.abs(ramps.dp_MPa[:, None] - knots), axis=1)
-    return RampModel(ramps=ramps, knots_MPa=knots, drift=drift, weights=np.linalg.pinv(basis), knot=nearest)
+    return RampModel(ramps=ramps, knots_MPa=knots, drift=drift, knot=nearest)
 
 
 def find_knots(dp_MPa: np.ndarray, *, share: bool) -> np.ndarray:

@@ -5,14 +5,18 @@ far too tightly, and its ramps would be set aside one after another. Only where 
 without one of them is that ramp the whole of it; elsewhere the knot keeps a variance of its own. Then outlying ramps
 are set aside. That the valve will not do the same again is a premise, which a warning and the certificate state. Of
 three ramps no test tells one that lies off from a wide scatter in which two happen to be alike.
+
+The scatter is what the residuals show beside each ramp's own error (Paule and Mandel): the sum of their squares, each
+over the variance of its ramp, is that of the degrees of freedom. The harmonic mean of these variances then has the
+degrees of freedom of the residuals, and stands for a ramp that is still to come.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
-from dzdesign.identify.fit.ramp_model import RampModel, Ramps, fit_ramp_model
+from dzdesign.identify.fit.ramp_model import SMALLEST_SD, RampModel, Ramps, fit_ramp_model
 
 Origin = Literal["repeats", "declared", "assumed"]
 #: Probability, all ramps counted, of a residual for which a ramp is set aside.
@@ -28,10 +32,13 @@ LIKE_OTHERS = 0.01
 LEAST_DEGREES = 2
 #: At most one ramp in so many is set aside.
 ONE_IN = 7
-#: Degrees of freedom below which a knot tells nothing of its scatter.
-NO_DEGREES = 0.5
+#: Degrees of freedom below which a knot tells nothing of its scatter; of a residual at least; and their rounding.
+NO_DEGREES, SMALLEST_FREE, ROUNDED = 0.5, 1e-6, 1e-6
 #: Probability of the repeats, if the declared or assumed scatter were true, below which theirs counts.
 CONTRADICTED = 1e-3
+#: Degrees of freedom of the error of a ramp's own line, which blocks of its residuals tell; and the smallest share of
+#: it in a variance that counts.
+OF_LINE, SMALLEST_SHARE = 14, 1e-3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,10 +63,10 @@ class SetAside:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scatter:
-    """The model of the ramps that are kept, and their scatter."""
+    """The model of the ramps that are kept, weighted by their scatter and their own errors."""
 
     model: RampModel
-    #: Of one ramp, V²: scatter and noise; infinite degrees of freedom where it was not measured.
+    #: Mean variance of a ramp, V², and its degrees of freedom.
     variance: float
     degrees: float
     #: Share of it that the next closing has.
@@ -69,9 +76,15 @@ class Scatter:
     set_aside: tuple[SetAside, ...]
 
     @property
-    def noise(self) -> float:
-        """Mean variance of the ramps by their own lines, V²."""
-        return float(np.mean(self.model.ramps.se**2))
+    def of_ramps(self) -> np.ndarray:
+        """Variance of each ramp, V² (n,): that of its knot where it scatters unlike the others."""
+        found = self.model.variances
+        if self.unlike is None:
+            return found
+        there, noise = self.model.knot == self.unlike.knot, self.model.ramps.se**2
+        more = max(self.unlike.variance - float(noise[there].mean()), self.model.scatter)
+        found[there] = np.maximum(more + noise[there], found[there])
+        return found
 
     @property
     def kept(self) -> np.ndarray:
@@ -100,42 +113,63 @@ def measure_scatter(ramps: Ramps, *, declared: float | None, assumed: float, lea
     while True:
         model = fit_ramp_model(ramps.only(kept), share_knots=declared is None)
         unlike = find_unlike_knot(model)
+        scatter = describe_scatter(model, unlike, declared=declared, assumed=assumed, least=least)
         outlying = None
         if not least and len(found) < ramps.y.size // ONE_IN:
-            outlying = _find_outlying(model, unlike, declared, assumed)
+            outlying = _find_outlying(scatter.model, unlike, measured=scatter.origin == "repeats")
         if outlying is None:
-            break
+            return replace(scatter, set_aside=tuple(found))
         at = int(np.flatnonzero(kept)[outlying.ramp])
         kept[at] = False
         found.append(SetAside(ramp=at, distance=outlying.distance, ratio=outlying.ratio))
-    return describe_scatter(model, unlike, declared=declared, assumed=assumed, least=least, set_aside=tuple(found))
 
 
 def describe_scatter(
-    model: RampModel,
-    unlike: Unlike | None,
-    *,
-    declared: float | None,
-    assumed: float,
-    least: float = 0.0,
-    set_aside: tuple[SetAside, ...] = (),
+    model: RampModel, unlike: Unlike | None, *, declared: float | None, assumed: float, least: float = 0.0
 ) -> Scatter:
     """Return the scatter of ramps that are kept, of which those at a knot may be unlike the others."""
-    squares, degrees = _squares(model, unlike)
-    noise = float(np.mean(model.ramps.se**2))
-    origin = _origin(squares, degrees, noise, declared, assumed)
-    known = (assumed if declared is None else declared) ** 2 + noise
+    alike = _alike(model, unlike)
+    known = (assumed if declared is None else declared) ** 2
+    origin = _origin(replace(model, scatter=known), alike, declared)
     measured = origin == "repeats"
+    model = weigh_by_scatter(model, alike) if measured else replace(model, scatter=known)
+    model = replace(model, scatter=max(model.scatter, least**2))
+    told = np.where(alike, model.free, 0.0) if measured else np.ones(model.ramps.y.size)
+    variance = float(told.sum() / np.sum(told / model.variances))
+    # A measured variance has the noise in it, and counts whole: what the repeats tell of the valve alone errs more.
+    share = 1.0 if measured else min(model.scatter / variance, 1.0)
     return Scatter(
         model=model,
-        variance=max(squares / degrees if measured else known, noise, least**2),
-        degrees=degrees if measured else np.inf,
-        # A measured variance has the noise in it, and counts whole: what the repeats tell of the valve alone errs more.
-        share=1.0 if measured or not known > 0 else 1 - noise / known,
+        variance=variance,
+        # A known scatter does not err, but the error of a ramp's line does.
+        degrees=float(np.round(told.sum(), 6)) if measured else OF_LINE / max(1 - share, SMALLEST_SHARE) ** 2,
+        share=share,
         origin=origin,
         unlike=unlike if measured else None,
-        set_aside=set_aside,
+        set_aside=(),
     )
+
+
+def weigh_by_scatter(model: RampModel, alike: np.ndarray | None = None) -> RampModel:
+    """Return the model with the scatter that its residuals show beside the ramps' own errors; zero if they show none.
+
+    `alike` (n,) are the ramps that tell it; None: all.
+    """
+    from scipy.optimize import brentq
+
+    alike = np.ones(model.ramps.y.size, dtype=bool) if alike is None else alike
+
+    def missing(scatter: float) -> float:
+        squares, degrees = _squares(replace(model, scatter=scatter), alike)
+        return degrees / squares - 1
+
+    squares, degrees = _squares(replace(model, scatter=0.0), alike)
+    if degrees < NO_DEGREES or squares <= degrees:
+        return replace(model, scatter=0.0)
+    highest = float(np.sum(model.residual[alike] ** 2)) / degrees
+    while missing(highest) < 0:
+        highest *= 2
+    return replace(model, scatter=float(brentq(missing, 0.0, highest, xtol=1e-14, rtol=1e-12)))
 
 
 def find_unlike_knot(model: RampModel) -> Unlike | None:
@@ -146,99 +180,95 @@ def find_unlike_knot(model: RampModel) -> Unlike | None:
     """
     from scipy.special import betainc
 
-    residual, free = model.projector @ model.ramps.y, np.diag(model.projector)
-    knots = np.arange(model.knots_MPa.size)
-    degrees = np.bincount(model.knot, weights=free, minlength=knots.size)
-    told = knots[degrees > NO_DEGREES]
-    total = float(degrees[told].sum())
-    if told.size < 2 or total < LEAST_DEGREES:
+    weighted = weigh_by_scatter(model)
+    chances = np.ones((2, model.knots_MPa.size))
+    for each, chance in zip((replace(model, scatter=0.0), weighted), chances, strict=True):
+        degrees = np.bincount(model.knot, weights=each.free, minlength=chance.size)
+        told = degrees > NO_DEGREES
+        total = float(degrees[told].sum())
+        if told.sum() < 2 or total < LEAST_DEGREES:
+            return None
+        ratio = np.bincount(model.knot, weights=each.residual**2 / each.variances, minlength=chance.size)
+        share = ratio / max(float(ratio[told].sum()), np.finfo(float).tiny)
+        more = told & (ratio > degrees)
+        chance[more] = told.sum() * (1 - betainc(degrees[more] / 2, (total - degrees[more]) / 2, share[more]))
+    worst = chances.max(axis=0)
+    knot = int(np.argmin(worst))
+    if worst[knot] > UNEQUAL or _one_explains(weighted, knot):
         return None
-    noise = model.ramps.se**2
-    of_valve = max(float(residual @ residual) / total - float(noise.mean()), 0.0)
-    chances = []
-    for each in (0.0, of_valve):
-        ratio = np.bincount(model.knot, weights=residual**2 / np.maximum(noise + each, np.finfo(float).tiny))[told]
-        share = ratio / max(float(ratio.sum()), np.finfo(float).tiny)
-        chance = told.size * (1 - betainc(degrees[told] / 2, (total - degrees[told]) / 2, share))
-        chances.append(np.where(ratio > degrees[told], chance, 1.0))
-    worst = int(np.argmin(np.max(chances, axis=0)))
-    p_value, knot = float(np.max(chances, axis=0)[worst]), int(told[worst])
-    if p_value > UNEQUAL or _one_explains(model, residual, knot):
-        return None
-    return unlike_at(model, knot, p_value)
+    return unlike_at(model, knot, float(worst[knot]))
 
 
 def unlike_at(model: RampModel, knot: int, p_value: float) -> Unlike:
     """Return the scatter at a knot whose ramps are unlike the others."""
-    there = model.knot == knot
-    degrees = float(np.diag(model.projector)[there].sum())
-    squares = float(np.sum((model.projector @ model.ramps.y)[there] ** 2))
+    model, there = weigh_by_scatter(model), model.knot == knot
+    degrees = float(np.round(model.free[there].sum(), 6))
+    squares = float(np.sum(model.residual[there] ** 2))
     return Unlike(knot=knot, variance=squares / degrees, degrees=degrees, p_value=p_value)
 
 
-def _one_explains(model: RampModel, residual: np.ndarray, knot: int) -> bool:
+def _one_explains(model: RampModel, knot: int) -> bool:
     """Tell whether the knot's ramps are like the others without the one that lies off most."""
     from scipy.special import fdtrc
 
-    free = np.maximum(np.diag(model.projector), 1e-6)
-    worst = int(np.argmax(np.where(model.knot == knot, np.abs(residual) / np.sqrt(free), -1.0)))
-    kept = np.arange(residual.size) != worst
+    ratio = model.residual**2 / np.maximum(model.free, SMALLEST_FREE) / model.variances
+    kept = np.arange(ratio.size) != np.argmax(np.where(model.knot == knot, ratio, -1.0))
     if np.sum(model.knot[kept] == knot) < 2:  # of two that differ, either may be the one: the lower one stays, below
         return True
     rest = fit_ramp_model(model.ramps.only(kept), share_knots=False)
     if rest.knots_MPa.size != model.knots_MPa.size:
         return False
-    left, free = rest.projector @ rest.ramps.y, np.diag(rest.projector)
     own, others = rest.knot == knot, rest.knot != knot
-    degrees = [float(free[part].sum()) for part in (own, others)]
-    if min(degrees) < NO_DEGREES:
+    rest = weigh_by_scatter(rest, others)
+    (squares, degrees), (_, of_others) = _squares(rest, own), _squares(rest, others)
+    if min(degrees, of_others) < NO_DEGREES:
         return False
-    noise = float(np.mean(rest.ramps.se**2))
-    variance = [max(float(np.sum(left[part] ** 2)), of * noise) / of
-                for part, of in zip((own, others), degrees, strict=True)]  # fmt: skip
-    return float(fdtrc(*degrees, variance[0] / variance[1])) > LIKE_OTHERS
+    return float(fdtrc(degrees, of_others, squares / degrees)) > LIKE_OTHERS
 
 
-def _squares(model: RampModel, unlike: Unlike | None) -> tuple[float, float]:
-    """Return the sum of squared residuals, V², and the degrees of freedom of the ramps that scatter alike."""
-    residual, free = model.projector @ model.ramps.y, np.diag(model.projector)
-    alike = np.ones(residual.size, dtype=bool) if unlike is None else model.knot != unlike.knot
-    return float(np.sum(residual[alike] ** 2)), float(np.round(free[alike].sum(), 6))
+def _alike(model: RampModel, unlike: Unlike | None) -> np.ndarray:
+    """Return which ramps scatter alike (n,)."""
+    return np.ones(model.knot.size, dtype=bool) if unlike is None else model.knot != unlike.knot
 
 
-def _find_outlying(model: RampModel, unlike: Unlike | None, declared: float | None, assumed: float) -> SetAside | None:
+def _squares(model: RampModel, ramps: np.ndarray) -> tuple[float, float]:
+    """Return the sum of the squared residuals of some ramps over their variances, and its degrees of freedom."""
+    projector = model.projector
+    squares = (projector @ model.ramps.y) ** 2 / model.variances
+    return float(squares[ramps].sum()), float(np.diag(projector)[ramps].sum())
+
+
+def _find_outlying(model: RampModel, unlike: Unlike | None, *, measured: bool) -> SetAside | None:
     """Return the ramp with the largest externally studentised residual, if that is no chance (Bonferroni).
 
     Of two that differ and have no third beside them the higher one: the lower one is the safer.
     """
     from scipy.special import stdtr
 
-    residual, own = model.projector @ model.ramps.y, np.maximum(np.diag(model.projector), 1e-6)
-    squares, degrees = _squares(model, unlike)
-    noise = float(np.mean(model.ramps.se**2))
-    if degrees <= LEAST_DEGREES:
+    residual, free, rest = model.residual, np.maximum(model.free, SMALLEST_FREE), model.variances
+    squares, degrees = _squares(model, _alike(model, unlike))
+    if degrees <= LEAST_DEGREES + ROUNDED:
         return None
-    if _origin(squares, degrees, noise, declared, assumed) == "repeats":
-        rest, of_rest = np.maximum((squares - residual**2 / own) / (degrees - 1), noise), degrees - 1
-    else:
-        rest, of_rest = np.full(own.size, (assumed if declared is None else declared) ** 2 + noise), 1e6
-    ratio = np.abs(residual) / np.sqrt(own * rest)
+    if measured:
+        others = (squares - residual**2 / free / rest) / (degrees - 1)
+        rest = np.maximum(others * rest, np.maximum(model.ramps.se, SMALLEST_SD) ** 2)
+    ratio = np.abs(residual) / np.sqrt(free * rest)
     if unlike is not None:
         ratio = np.where(model.knot == unlike.knot, 0.0, ratio)
-    if 2 * ratio.size * stdtr(of_rest, -ratio.max()) > OUTLYING:
+    if 2 * ratio.size * stdtr(degrees - 1 if measured else np.inf, -ratio.max()) > OUTLYING:
         return None
     rows = np.flatnonzero(ratio > (1 - 1e-6) * ratio.max())
     row = int(rows[np.argmax(model.ramps.y[rows])])
-    return SetAside(ramp=row, distance=float(residual[row] / own[row]), ratio=float(ratio[row]))
+    return SetAside(ramp=row, distance=float(residual[row] / free[row]), ratio=float(ratio[row]))
 
 
-def _origin(squares: float, degrees: float, noise: float, declared: float | None, assumed: float) -> Origin:
+def _origin(known: RampModel, alike: np.ndarray, declared: float | None) -> Origin:
     """Return where the scatter is from: a declared or assumed one counts unless the repeats contradict it."""
     from scipy.special import chdtrc
 
-    if declared is None and degrees >= LEAST_DEGREES:
+    squares, degrees = _squares(known, alike)
+    if declared is None and degrees >= LEAST_DEGREES - ROUNDED:
         return "repeats"
-    expected = max((assumed if declared is None else declared) ** 2 + noise, np.finfo(float).tiny)
-    if degrees > NO_DEGREES and chdtrc(degrees, squares / expected) < CONTRADICTED:
+    if degrees > NO_DEGREES and chdtrc(degrees, squares) < CONTRADICTED:
         return "repeats"
     return "assumed" if declared is None else "declared"

@@ -196,8 +196,8 @@ def _why_none(scatter: Scatter, curves: CurveClass, bound: np.ndarray) -> str:
     """Say why no offset is left: the threshold where its bound is lowest, and what the bound takes off."""
     ramps, worst = scatter.model.ramps, int(bound.argmin())
     nearest = int(np.argmin(np.abs(ramps.dp_MPa - curves.grid_MPa[worst])))
-    budget = ramps.shared + (0.0 if ramps.budget is None else float(ramps.budget[nearest]))
-    known = "" if np.isinf(scatter.degrees) else f" (degrees of freedom: {scatter.degrees:.0f})"
+    budget = ramps.shared + float(ramps.budgets[nearest])
+    known = "" if scatter.origin != "repeats" else f" (degrees of freedom: {scatter.degrees:.0f})"
     return (
         f"the threshold's lower bound is {Shown(bound[worst]):.3f V}, not above zero. There the threshold is "
         f"{Shown(ramps.y[nearest]):.4g V}, with a standard deviation of "

@@ -11,14 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dzdesign.identify.constants import REFUSED, Direction
-from dzdesign.identify.fit.curve_class import scatter_of_ramps
 from dzdesign.identify.fit.ramp_model import Ramps
 from dzdesign.identify.fit.scatter import Scatter, measure_scatter
 from dzdesign.identify.fitting.soft_edges import find_softness, fit_edge_shapes
 from dzdesign.identify.fitting.zero_flow import find_zero_flow, student_errors
 from dzdesign.identify.knees.between_ramps import DECIMALS
 from dzdesign.identify.knees.described_tests import DescribedTests, Knees
-from dzdesign.identify.knees.line_fitting import DEGREES_OF_FREEDOM
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.valve.guard_curve import Guard
 
@@ -30,8 +28,6 @@ SOFT_SIGNIFICANCE = 3.5
 TREND_SIGNIFICANCE = 0.01
 #: Share of the error probability that bounds of single tests leave to others.
 SHARE_OF_OTHERS = 0.25
-#: Smallest share of the noise in a variance that is counted in its degrees of freedom.
-SMALLEST_SHARE = 1e-3
 #: Errors below this share of u_max weigh alike: an exact table has none.
 FINEST_ERROR = 1e-5
 
@@ -229,19 +225,14 @@ def find_trend(scatter: Scatter, test: np.ndarray, extra_se: np.ndarray, *, u_ma
     dp = ramps.dp_MPa
     if not np.ptp(dp) > 0:
         return Trend(direction="flat", change=math.nan, change_se=math.nan, p_value=math.nan)
-    clock = [ramps.clock] if scatter.model.drift and ramps.clock is not None else []
     # Generalised least squares: each ramp has its own noise; what is uncertain of a test beyond that, its ramps share.
-    of_valve = np.maximum(scatter_of_ramps(scatter) - scatter.noise, 0.0)
-    covariance = np.diag(of_valve + ramps.se**2 + (FINEST_ERROR * u_max) ** 2)
+    covariance = np.diag(scatter.of_ramps + (FINEST_ERROR * u_max) ** 2)
     covariance += np.where(test[:, None] == test, extra_se[test] ** 2, 0.0)
-    line = np.column_stack([np.ones_like(dp), (dp - dp.min()) / np.ptp(dp), *clock])
+    line = scatter.model.with_clock(np.column_stack([np.ones_like(dp), (dp - dp.min()) / np.ptp(dp)]))
     weighted = np.linalg.solve(covariance, line).T
     of_line = np.linalg.inv(weighted @ line)
     change, change_se = float((of_line @ weighted @ ramps.y)[1]), math.sqrt(float(of_line[1, 1]))
-    # What is not measured on repeats is known but for the ramps' noise, which blocks of residuals tell.
-    known = DEGREES_OF_FREEDOM / max(1 - scatter.share, SMALLEST_SHARE) ** 2
-    degrees = scatter.degrees if scatter.origin == "repeats" else known
-    p_value = float(2 * stdtr(degrees, -abs(change) / change_se))
+    p_value = float(2 * stdtr(scatter.degrees, -abs(change) / change_se))
     flat = abs(change) < budget or p_value > TREND_SIGNIFICANCE
     direction: Direction = "flat" if flat else "decreasing" if change < 0 else "increasing"
     return Trend(direction=direction, change=change, change_se=change_se, p_value=p_value)
@@ -289,8 +280,6 @@ def _mean_of(group: DescribedTests, opening: GuardedThreshold, closing: GuardedT
         [(place[source], at) for at, source in enumerate(closing.sources) if source in place], dtype=int
     ).reshape(-1, 2).T  # fmt: skip
     up, down = opening.ramps, closing.ramps
-    if up.budget is None or down.budget is None:
-        raise ValueError("ramps without a budget have no mean")
     least_sd = max(opening.least_sd, closing.least_sd)
     if set(closing.test[falling]) != set(closing.test):  # no ramp tells both branches: each test counts as one
         rows = np.arange(threshold.value.size)
@@ -309,7 +298,7 @@ def _mean_of(group: DescribedTests, opening: GuardedThreshold, closing: GuardedT
     credit = (opening.threshold.lag_budget + closing.threshold.lag_budget) / 2 - threshold.lag_budget
     credit = credit + shared - (up.shared + down.shared) / 2
     test = closing.test[falling]
-    budget = np.maximum((up.budget[rising] + down.budget[falling]) / 2 - credit[test], 0.0)
+    budget = np.maximum((up.budgets[rising] + down.budgets[falling]) / 2 - credit[test], 0.0)
     ramps = Ramps(
         dp_MPa=down.dp_MPa[falling],
         y=np.round((up.y[rising] + down.y[falling]) / 2, DECIMALS),

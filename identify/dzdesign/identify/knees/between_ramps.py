@@ -108,8 +108,7 @@ class BetweenRamps:
         Without `noise`, less a threshold in whose error that of the ramps is already.
         """
         of_next, count = self.scatter.share * self.scatter.variance, np.bincount(self.test)
-        of_valve = max(self.scatter.variance - self.scatter.noise, 0.0)
-        own = of_valve + np.bincount(self.test, self.ramps.se**2) / count
+        own = self.scatter.model.scatter + np.bincount(self.test, self.ramps.se**2) / count
         found: np.ndarray = of_next + (own if noise else of_next) / count
         return found
 

@@ -35,9 +35,12 @@ EXPLAINED, LEAK_ERRORS = 0.5, 4.0
 HIDES_NOISE, HIDES_ALL = 0.6, 0.95
 LOW_FLOW, MIDDLE_FLOW, FEWEST_AT_FLOW = (0.02, 0.1), (0.3, 0.6), 40
 NOISE_OVER_STEP, NOISE_OVER_FLOW, NOISE_OVER_MIDDLE = 0.5, 5e-5, 0.2
-#: Readings below this share of those at rest, and by so many standard deviations, of which so many follow each other
-#: and differ, are of a flow that was below zero and lost its sign.
-DIP, DIP_SIGMAS, FEWEST_DIPS = 0.6, 3.0, 2
+#: Readings below this share of those at rest, of which so many follow each other and differ, are of a flow that was
+#: below zero and lost its sign. They are means over the fewest of these numbers of rows whose noise at rest leaves so
+#: many standard deviations between the two.
+DIP, DIP_SIGMAS, FEWEST_DIPS, ROWS = 0.6, 5.0, 2, (1, 4, 9, 16, 25, 36)
+#: One meter has one zero: what more than a third of the recordings show counts. A steep ramp hides a dip.
+SHOWN_BY = 2 / 3
 #: Share of the readings up to twice a meter's floor that may lie below so much of it: with more it hides none.
 BELOW_FLOOR, OF_FLOOR = 0.1, 0.75
 #: Zero error of a meter that may stay hidden: 0.5 % of a range of ten times the largest flow, as data sheets have it.
@@ -274,7 +277,7 @@ def hidden_zero(tests: Sequence[RampTest], floor: float, options: IdentifyOption
     largest = max(float(np.abs(test.q).max()) for test in tests)
     found = [_hidden_in(test, floor, largest, options.u_max) for test in tests]
     told = [value for value in found if value is not None]
-    return float(np.median(told)) if told else 0.0
+    return float(np.quantile(told, SHOWN_BY, method="higher")) if told else 0.0
 
 
 def _hidden_in(test: RampTest, floor: float, largest: float, u_max: float) -> float | None:
@@ -304,11 +307,17 @@ def _is_a_magnitude(q: np.ndarray, rest: np.ndarray) -> bool:
 
     Where the valve opens such readings fall before they rise, through several values, unlike a drop-out.
     """
-    zero, noise = median(rest), robust_sigma(rest)
-    dips = (q < min(zero - DIP_SIGMAS * noise, DIP * zero)) & (q > 0)
-    through = np.count_nonzero(dips[1:] & dips[:-1] & (np.diff(q) != 0))
-    no_dip_at_rest = zero > DIP_SIGMAS * noise and float(rest.min()) >= DIP * zero
-    return bool(float(q.min()) >= 0 and no_dip_at_rest and through >= FEWEST_DIPS)
+    if float(q.min()) < 0:
+        return False
+    for rows in ROWS:
+        if min(q.size, rest.size - FEWEST_AT_REST) < rows:
+            break
+        means, rests = (np.convolve(each, np.full(rows, 1 / rows), "valid") for each in (q, rest))
+        whole = np.convolve(q > 0, np.ones(rows), "valid") > rows - 0.5  # a drop-out is no dip, and no part of one
+        zero, dips = median(rests), (means < DIP * median(rests)) & whole
+        if (1 - DIP) * zero > DIP_SIGMAS * robust_sigma(rests) and float(rests.min()) >= DIP * zero:
+            return bool(np.count_nonzero(dips[1:] & dips[:-1] & (np.diff(means) != 0)) >= FEWEST_DIPS)
+    return False
 
 
 def _noise_between(q: np.ndarray, shares: tuple[float, float]) -> float | None:

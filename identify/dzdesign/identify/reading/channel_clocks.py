@@ -21,10 +21,11 @@ ROUNDED = 0.1
 ALIKE_SPANS = 0.1
 #: Over a pause of more than so many of its own usual steps a channel has no reading.
 PAUSE = 3.0
-#: Rows at the end in which a column may be blank beside others: the last one was written in part.
+#: Rows at the end in which a column may be blank beside others, or show something again: they were written in part.
 LAST_ROWS, SHARE_OF_LAST = 2, 1e-3
 #: Rows at the end of a flow that repeat one value, so many times as long as any before, within so many standard
-#: deviations of the readings before, which turn so often: the column was filled up.
+#: deviations of the readings before, which turn so often: the column was filled up. A gap before the last rows that is
+#: so many times as long as any other is its end.
 HELD, LONGER_HELD, NEAR_HELD, TURNS = 10, 5, 4.0, 3
 #: A channel that has no reading in more than this share of the command's rows is said in any case.
 LOST = 0.1
@@ -164,30 +165,41 @@ def _held_to_the_end(values: np.ndarray) -> int:
     return tail if near and turns >= TURNS and np.isfinite(before).all() else 0
 
 
+def _last_before_a_gap(known: np.ndarray) -> int:
+    """Return which of the rows with a reading is the last one, if those behind a gap unlike any other don't count."""
+    gaps = np.diff(known)
+    for behind in range(1, min(LAST_ROWS, gaps.size - 1) + 1):
+        if gaps[-behind] > LONGER_HELD * gaps[:-behind].max():
+            return known.size - 1 - behind
+    return known.size - 1
+
+
 def refuse_an_early_end(table: Table, found: Mapping[str, Column], data: Mapping[str, np.ndarray]) -> None:
     """Refuse a column without a time of its own that is blank to the end while others go on.
 
     It may have been laid beside them from its first row on with another clock. One that a logger wrote in part in its
-    last row is none, nor one with a reading in every tenth row. A flow that is filled up to the end has ended as well.
+    last row is none, nor one with a reading in every tenth row. A flow that is filled up to the end has ended as well,
+    and so has a column that shows something once more in its last rows, as of a final record.
     """
     flow = found["Q"]
-    if flow.clock is None and (held := _held_to_the_end(data["Q"])):
-        raise InputError(
-            f"'{table.path}' column '{flow.label}' repeats its last value to the last digit from "
-            f"{table.place(data['Q'].size - held)} on, {held} rows, as nowhere else, so it may have ended before the "
-            "others; export it with its own time, or cut these rows if the meter was switched off there"
-        )
-    if all(np.isfinite(data[quantity][-1:]).all() for quantity in found):
-        return
+    for size in range(data["Q"].size, data["Q"].size - LAST_ROWS - 1, -1) if flow.clock is None else ():
+        if held := _held_to_the_end(data["Q"][:size]):
+            raise InputError(
+                f"'{table.path}' column '{flow.label}' repeats its last value to the last digit from "
+                f"{table.place(size - held)} on, {held} rows, as nowhere else, so it may have ended before the "
+                "others; export it with its own time, or cut these rows if the meter was switched off there"
+            )
     last = {}
     for quantity, column in found.items():
         known = np.flatnonzero(np.isfinite(data[quantity]))
         if column.clock is None and known.size > 1:
-            last[quantity] = int(known[-1]), float(np.median(np.diff(known)))
-    end = max((row for quantity, (row, _) in last.items() if quantity != "time"), default=0)
-    for quantity, (row, usual) in last.items():
+            until, usual = _last_before_a_gap(known), float(np.median(np.diff(known)))
+            last[quantity] = int(known[until]), usual, known[until + 1 :][:1]
+    end = max((row for quantity, (row, _, _) in last.items() if quantity != "time"), default=0)
+    for quantity, (row, usual, again) in last.items():
         allowed = max(1, min(LAST_ROWS, int(SHARE_OF_LAST * end))) * usual
-        ended = (np.isnan(table.numbers(each.label)[row + 1 :]).all() for each in found[quantity].every)
+        blank = slice(row + 1, int(again[0]) if again.size else None)
+        ended = (np.isnan(table.numbers(each.label)[blank]).all() for each in found[quantity].every)
         if end - row <= allowed or not any(ended):
             continue  # what stands there is a number that means no value: the row is one
         time = data["time"]

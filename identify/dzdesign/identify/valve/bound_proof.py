@@ -183,7 +183,6 @@ class BoundProof:
         """Return what a certificate rests on; `sources` and `y` are of all ramps, those set aside too."""
         ramps, curves, criticals = scatter.model.ramps, certificate.curves, certificate.criticals
         kept = [source for source, counts in zip(sources, scatter.kept, strict=True) if counts]
-        budget = np.zeros(ramps.y.size) if ramps.budget is None else ramps.budget
         declared: dict[Kind, Literal["line", "smooth", "monotone"]] = {
             "line": "line", "smooth": "smooth", "monotone": "monotone"
         }  # fmt: skip
@@ -191,7 +190,7 @@ class BoundProof:
             ramps=tuple(
                 GuardedRamp(
                     source=source, dp_MPa=float(ramps.dp_MPa[at]) if with_dp else None, u_V=float(ramps.y[at]),
-                    se_V=float(ramps.se[at]), budget_V=float(budget[at]),
+                    se_V=float(ramps.se[at]), budget_V=float(ramps.budgets[at]),
                     place=None if ramps.clock is None else float(ramps.clock[at]),
                 )
                 for at, source in enumerate(kept)
