@@ -11,6 +11,9 @@ import numpy as np
 import pytest
 
 from dzdesign.command_line.cli import main
+from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.errors import InputError
+from dzdesign.identify.valve.model import ValveModel
 from tests.support.synthetic import needs_compiler
 
 HEADER = "time_s,u_V,dP_MPa,Q_Lmin"
@@ -90,28 +93,11 @@ def refusal(bench, capsys):
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (b"", "is empty, comments and blank lines apart"),
-        (csv(ramp()).partition("\n")[2].encode(), "has no header row"),
-        (csv(ramp(), "time,u,dP,Q").encode(), "column 'time' has no unit"),
-        (csv(ramp(), "time_s,u_V,dP_xyz,Q_Lmin").encode(), "column 'dP_xyz': 'xyz' is not a unit of pressure"),
-        (csv(ramp(), "time_s,u_V,dP_V,Q_Lmin").encode(), "column 'dP_V': 'V' is not a unit of pressure"),
-        (csv(ramp(), "time_s,comand_V,dP_MPa,Q_Lmin").encode(), "no column of u"),
-        (csv(ramp(), "time_s,comand_V,dP_MPa,Q_Lmin").encode(), "u=comand_V"),
-        (csv(ramp(), "time_s,u_V,u [V],Q_Lmin").encode(), "two columns of u: 'u_V' and 'u [V]'"),
-        (csv(ramp(), "time_s,u_V,pA_MPa,Q_Lmin").encode(), "a column of pA but none of pB"),
         (("# bench 3\n\n" + csv(ramp()) + "1,x,3,4\n").encode(), "row 1004, column 'u_V': 'x' is not a number"),
-        (("# bench 3\n\n" + csv(ramp()) + "1,2,1e30,4\n").encode(), "row 1004, column 'dP_MPa': '1e+30'"),
-        (("# bench 3\n\n" + csv(ramp()) + "1,2,3,4\n").encode(), "row 1004: the time goes back"),
-        ((csv(ramp()) + "1,2,3\n").encode(), "row 1002 has 3 cells, expected 4"),
-        ((csv(ramp()) + "1,2,3,4,5\n").encode(), "row 1002 has 5 cells, expected 4"),
         (gzip.compress(csv(ramp()).encode(), mtime=0)[:-9], "is not a whole gzip file"),
-        (gzip.compress(csv(ramp()).encode(), mtime=0)[:99] + b"\0" * 9, "is not a whole gzip file"),
-        (csv(ramp()).encode("utf-16-le"), "is not a text file"),
-        (b"# 40 \x90C\n" + csv(ramp()).encode(), "is not a text file"),
         (csv(ramp() * [1, 1, 1, 0]).encode(), "does not show the valve opening"),
         (csv(ramp() * [1, 0, 1, 1]).encode(), "holds no ramp of the command"),
         (csv(ramp() * [1, 1, -1, 1]).encode(), "swap pA and pB"),
-        (csv(ramp() * [1, 1.2, 1, 1]).encode(), "give --u-max"),
         (csv(ramp(), "time_s,u_V,dP_mPa,Q_Lmin").encode(), "correct the unit in the header"),
         (csv(ramp(1.0) * [1, 1, 500, 1]).encode(), "the pressure drop is 500 MPa"),
         (
@@ -365,16 +351,9 @@ def altered(document, path, change):
 SIDE = ("sides", "positive")
 VALVES = [
     (("u_max_V",), None),
-    (("u_max_V",), "10"),
-    (("u_max_V",), True),
     (("u_max_V",), 0),
-    (("sides",), []),
     ((*SIDE, "tests"), []),
-    ((*SIDE, "tests", 0), None),
     ((*SIDE, "tests", 1, "dp_MPa"), "4"),
-    ((*SIDE, "tests", 1, "u_guard_lower_V"), None),
-    ((*SIDE, "tests", 1, "u_knee_rising_V"), "x"),
-    ((*SIDE, "reference", "u_min_V"), "5"),
     ((*SIDE, "reference", "u_min_V"), -5),
     ((*SIDE, "k_x_max_over_u_max"), 10**40),
     ((*SIDE, "trend"), "downhill"),
@@ -389,41 +368,21 @@ VALVES = [
     ((*SIDE, "identified", "closing", "beta_se", 0), -1),
     ((*SIDE, "identified", "closing", "u_V"), [5]),
     ((*SIDE, "k_x_max_over_u_max_se"), -1),
-    ((*SIDE, "certificate", "confidence"), "high"),
-    ((*SIDE, "certified"), []),
-    ((*SIDE, "certified", "mean"), 5),
-    ((*SIDE, "certified", "mean", "offset_V"), None),
-    ((*SIDE, "certified", "mean", "u_lower_V", 1), "5"),
     ((*SIDE, "certified", "opening", "u_min0_V"), 0),
     ((*SIDE, "certified", "opening", "dp_MPa"), [4, 1]),
-    ((*SIDE, "certified", "opening", "dp_MPa"), [1, 3]),
-    ((*SIDE, "certified", "opening", "u_threshold_V"), [5]),
     ((*SIDE, "certified", "opening", "offset_dp_MPa"), [1, 3]),
-    ((*SIDE, "certified", "opening", "u_lower_V", 0), 9),
-    ((*SIDE, "certified", "closing", "u_min0_V"), 4),
     ((*SIDE, "certificate", "guard"), "shut"),
-    ((*SIDE, "tests", 1, "ramps"), None),
     ((*SIDE, "tests", 1, "ramps"), []),
-    ((*SIDE, "tests", 1, "ramps"), "a.csv"),
-    ((*SIDE, "opening_curve"), []),
-    ((*SIDE, "opening_curve", "u_V"), None),
     ((*SIDE, "opening_curve", "u_V", 0), None),
     ((*SIDE, "opening_curve", "u_V"), [1, 1]),
     ((*SIDE, "opening_curve", "u_V"), [8, 9]),
-    ((*SIDE, "opening_curve", "dp_MPa"), [1, 3]),
-    (("warnings",), ["none"]),
-    (("made_from",), {}),
 ]
 POSITIVE = ("sides", "positive")
 COMPENSATORS = [
-    (("signals",), None, "lacks the key 'signals'"),
     (("valve",), None, "lacks the key 'valve'"),
-    (("valve", "u_max_V"), None, "lacks the key 'valve.u_max_V'"),
     (("made_from",), [], "'made_from' has 0 files, expected valve.json alone"),
     (("law",), "papr", "unknown law 'papr' (did you mean 'paper'?)"),
     (("u_max_V",), [10, 0], "'u_max_V' is [10, 0], expected [numerator, denominator]: whole numbers"),
-    (("u_max_V",), [10], "'u_max_V' is [10], expected [numerator, denominator]"),
-    (("u_max_V",), 10.0, "'u_max_V' is 10.0, expected [numerator, denominator]"),
     (("u_max_V",), [-10, 1], "'u_max_V' is -10, not that of its valve"),
     ((*POSITIVE, "drive_range_over_u_max", 0), 10**70, "'sides.positive.drive_range_over_u_max' is [1000"),
     ((*POSITIVE, "drive_range_over_u_max", 0), -1, "k x_max/u_max must be positive"),
@@ -431,14 +390,12 @@ COMPENSATORS = [
     ((*POSITIVE, "u_min0_over_u_max"), [3, 2], "u_min0 is 1.500 of u_max, expected between 0 and 1"),
     ((*POSITIVE, "beta"), [1, 2], "the transition's beta must have as many nodes"),
     ((*POSITIVE, "beta", 3), 0, "'sides.positive.beta[3]' is 0"),
-    ((*POSITIVE, "beta", 3), 1.5, "'sides.positive.beta[3]' is 1.5, expected int"),
     ((*POSITIVE, "transition_beta"), [1, 2], "the transition's beta must have as many nodes"),
     (("transition_codes",), 0, "a transition needs the opening threshold's beta"),
     (("beta_denominator",), 3, "beta_denominator is 3, expected a power of two"),
     (("beta_step_codes",), 0, "'beta_step_codes' is 0"),
     (("below_dp0",), "held", "'below_dp0' is 'held'"),
     (("reverse_codes",), -1, "'reverse_codes' is -1"),
-    (("reverse_codes",), "40", "'reverse_codes' is '40'"),
     (("signals", "compare_max"), 10**9, "'signals.compare_max' is 1000000000, expected int <= 65535"),
     (("signals", "compare_max"), 1000, "the compare limit is 60000, above full drive, 1000"),
     (("signals", "pressure_a", "span_MPa"), [0, 1], "the sensor's span is 0 MPa"),
@@ -452,12 +409,12 @@ COMPENSATORS = [
 
 
 @pytest.mark.parametrize(("path", "change"), VALVES)
-def test_a_valve_whose_value_does_not_fit(refusal, bench, path, change, wording):
-    document = json.loads((bench / "valve.json").read_text())
-    (bench / "bad.json").write_text(json.dumps(altered(document, path, change)))
+def test_a_valve_whose_value_does_not_fit(good, path, change, wording):
+    """Each rule of a valve.json; what any artefact is refused for stands in tests/core."""
+    document = json.loads((good / "valve.json").read_text())
     place = ".".join(map(str, path))
-    change = "gone" if change is None else short(str(change))
-    wording(f"bad valve.json: {place} {change}", refusal("design", "bad.json", "-o", "new.json"))
+    with wording.refusal(InputError, f"bad valve.json: {place} {'gone' if change is None else change}"):
+        read_artefact(json.dumps(altered(document, path, change)).encode(), ValveModel, "bad.json")
 
 
 @pytest.mark.slow
@@ -466,26 +423,6 @@ def test_a_compensator_whose_value_does_not_fit(refusal, bench, path, change, wo
     document = json.loads((bench / "compensator.json").read_text())
     (bench / "bad.json").write_text(json.dumps(altered(document, path, change)))
     assert words in refusal("codegen", "bad.json", "-o", "new")
-
-
-@pytest.mark.parametrize(
-    ("content", "words"),
-    [
-        (b"", "is not JSON"),
-        (HEADER.encode(), "is not JSON"),
-        (b'{"schema": "dzdesign.valve/1", "u_max_V": NaN}', "is not JSON (NaN is not a number of JSON)"),
-        (b'{"schema": "dzdesign.valve/1", "u_max_V": 1e999}', "is not JSON"),
-        (b'{"schema": "dzdesign.valve/1", "u_max_V": ' + b"[" * 9999, "is not JSON"),
-        ('{"schema": "dzdesign.valve/1"}'.encode("utf-16"), "is not JSON"),
-        (b"[]", "has the schema 'None', expected dzdesign.valve/1"),
-        (b'{"schema": "dzdesign.valve/9"}', "has the schema 'dzdesign.valve/9', expected dzdesign.valve/1"),
-    ],
-)
-def test_what_is_no_valve_at_all(refusal, bench, content, words):
-    (bench / "bad.json").write_bytes(content)
-    line = refusal("design", "bad.json", "-o", "new")
-    assert "'bad.json'" in line
-    assert words.partition(", expected")[0] in line
 
 
 def test_every_artefact_in_the_place_of_another(refusal):
@@ -592,10 +529,7 @@ def test_a_plant_that_is_not_there(refusal):
     ("name", "content", "words"),
     [
         ("manifest.json", "{}", "has the schema 'None', expected dzdesign.firmware/1"),
-        ("manifest.json", "no JSON", "is not JSON"),
         ("manifest.json", '{"schema": "dzdesign.firmware/1"}', "lacks the key 'tool'"),
-        ("manifest.json", '{"schema": "dzdesign.firmware/1", "files": []}', "'files' is [], expected object"),
-        ("compensator.json", '{"schema": "dzdesign.compensator/1"}', "lacks the key"),
         ("compensator.json", None, "compensator.json' does not exist"),
     ],
 )

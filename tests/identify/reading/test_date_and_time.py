@@ -184,6 +184,9 @@ SPELLED = {
     "compact without a T": stamps("%Y%m%d%H%M%S.", LATE),
     "IEC date": stamps("DT#%Y-%m-%d-%H:%M:%S.", LATE),
     "IEC time of day": stamps("TOD#%H:%M:%S.", LATE),
+    "two digits": stamps("%d.%m.%y %H:%M:%S.", LATE),
+    "colon before milliseconds": stamps("%H:%M:%S:", LATE),
+    "offset": [f"{stamp}+01:00" for stamp in stamps("%Y-%m-%dT%H:%M:%S.", LATE)],
     "seconds": [f"{second} sec" for second in SECONDS],
     "seconds, or milliseconds": [f"{1000 * t:.0f} ms" if t < 1 else f"{t:.3f} s".replace(".", ",") for t in TIME],
     "pandas": [f"0 days 23:59:{50 + t:06.3f}" if t < 10 else f"1 days 00:00:{t - 10:06.3f}" for t in TIME],
@@ -198,7 +201,7 @@ def test_a_time_as_programs_spell_it(read, name):
     np.testing.assert_allclose(test.time, TIME, atol=6e-4)
     if name in ("MATLAB", "German", "French", "English", "year first"):
         assert test.stamp == start_of("2026-12-31 23:59:50.123")
-    assert (test.stamp is None) == name.startswith(("IEC t", "IEC du", "sec", "pandas"))
+    assert (test.stamp is None) == name.startswith(("IEC t", "IEC du", "sec", "pandas", "two", "colon"))
 
 
 def test_recordings_that_overlap_are_seen(read):

@@ -121,6 +121,7 @@ REFUSED = {
     "JSON": (plain(b'{"a": 1}'), ""),
     "HTML": (plain(b"<html>"), ""),
     # the header
+    "a sentence above the header": (plain("Logger 3, made by hand\n" + HEADER + "\n0,0,1,0\n"), "row 3"),
     "no header": (plain(table().partition("\n")[2]), "row 1"),
     "no samples": (plain(HEADER + "\n"), ""),
     "two columns of u": (plain(table("time_s,u_V,u [V],Q_Lmin")), "row 1"),
@@ -190,6 +191,7 @@ REFUSED = {
         "column 'dP_kPa'",
     ) for mark in ".,"},
     # times
+    "a stamp below seconds": (plain(spoiled(2, 0, "2024-05-01 12:00:00")), "row 3, column 'time_s'"),
     "a time that goes back": (plain(spoiled(7, 0, "0.1")), "row 8"),
     "03:04": (plain(clocked("03:04")), "column 'time'"),
     "04:05,5": (plain(clocked("04:05,5")), "column 'time'"),
