@@ -91,7 +91,7 @@ SEEDED = {
     "half a file": ("host", cut_short("core/dz_comp.c"), 1, "core/dz_comp.c, line"),
     "no file": ("cortex-m4", lambda folder: (folder / "core/dz_comp.h").unlink(), 1, "core/dz_comp.h is missing"),
     "a file more in the core": ("cortex-m4", lambda f: add(f, "core/dz_old.c", "int x;\n"), 1, "core/dz_old.c"),
-    "swapped channels": ("f28335", in_c("f28335/dz_hardware.c", "CONV02 = DZ_", "CONV01 = DZ_"), 1, "f28335/dz_hardware.c"),
+    "swapped channels": ("f28335", in_c("f28335/dz_hardware.c", "CONV02 = DZ_", "CONV01 = DZ_"), 1, "dz_hardware.c"),
     "an option of the compiler": ("f28335", in_c("f28335/Makefile", "-O2", "-O3"), 1, "f28335/Makefile, line"),
     "a copy of ours in board": ("cortex-m4", lambda f: add(f, "board/DZ_DRIVE.H"), 1, "board/DZ_DRIVE.H"),
     "an octet of the block": ("block", one_octet("calibration.bin"), 1, "calibration.bin differs from octet 40 on"),

@@ -11,20 +11,20 @@ from tests.support.paths import ROOT
 
 #: Of a room: lines of Python, files of Python, lines of templates, C programs, headers and tables.
 ROOM_SIZES = {
-    "core": (2500, 15, 0),
-    "derivation": (4704, 28, 325),
-    "identify": (16090, 93, 1064),
+    "core": (2510, 15, 0),
+    "derivation": (4703, 28, 325),
+    "identify": (16141, 93, 1064),
     "assess": (1577, 8, 0),
-    "design": (6662, 30, 0),
-    "codegen": (7405, 50, 7308),
-    "verify": (9586, 53, 2057),
+    "design": (6950, 31, 0),
+    "codegen": (7522, 50, 7588),
+    "verify": (11021, 60, 4212),
     "report": (4416, 20, 532),
-    "dzdesign": (8718, 59, 156),
+    "dzdesign": (8729, 59, 161),
 }
 #: Lines of Python of what is not shipped, and of the files that the tests compare with.
-TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 45008, 13887, 8473
+TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 45607, 14267, 8531
 #: Options of all commands together; an option of two commands counts twice.
-OPTIONS = 161
+OPTIONS = 165
 #: What a number may be above what is there, before it is to be lowered.
 SLACK = 0.02
 TEXTS = {".jinja", ".c", ".h", ".m", ".ld", ".toml", ".html", ".css", ".js", ".svg", ".md", ".txt"}

@@ -87,8 +87,7 @@ class Swinging:
                 np.maximum(before, np.abs(loop.x), out=before)
                 was = np.sign(loop.x)
         cycles = (crossed > 1) & (last > DECAY * before)
-        rests: np.ndarray = ~cycles.any(axis=(1, 2))
-        return rests
+        return np.asarray(~cycles.any(axis=(1, 2)))
 
 
 class _Loop:

@@ -1,5 +1,5 @@
 /* Written by dzdesign 1.0.0 from template dz_board.h.jinja. Yours to edit: `dzdesign codegen` keeps what */
-/* you change here, and `dzdesign verify` names this file as yours and does not check it. */
+/* you change here, and `dzdesign verify` names this file as yours. */
 
 /* What of your board the firmware must know: its clock. */
 #ifndef DZ_BOARD_H
