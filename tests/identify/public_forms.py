@@ -12,8 +12,6 @@ import numpy as np
 PLAY = 0.2
 PRESSURES = (1.0, 3.0, 5.0)
 RATE_HZ = 20.0
-#: Date of the first row, where a form states one.
-START = np.datetime64("2026-02-03T08:00:00.000", "ms")
 
 
 def opening(dp_MPa: float) -> float:
@@ -112,60 +110,10 @@ def plain(bench: Bench) -> dict[str, Sequence]:
     return {"time_s": bench.time, **bench.signals()}
 
 
-def stamped(bench: Bench, spell: Callable[[float], str], label: str = "time") -> bytes:
-    """Return a table whose time is spelt, from seconds."""
-    return csv({label: [spell(second) for second in bench.time], **bench.signals()}, separator=";")
-
-
-def date(second: float) -> str:
-    """Return date and time as ISO 8601 has them, with milliseconds."""
-    return str(START + np.timedelta64(round(1000 * second), "ms"))
-
-
 def shifted(bench: Bench, seconds: float) -> tuple[np.ndarray, np.ndarray]:
     """Return times and values of a flow channel that was sampled on a clock of its own, so much later."""
     time = bench.time[bench.time + seconds <= bench.time[-1]] + seconds
     return time, np.interp(time, bench.time, bench.q)
-
-
-def tdms(bench: Bench, late_s: float = 0.0, by: str = "wf_start_time", step: float = 1.0) -> bytes:
-    """Return a TDMS file of waveforms, the flow's with a start, offset or step of its own."""
-    import io
-
-    from nptdms import ChannelObject, TdmsWriter
-
-    time = bench.time[bench.time * step + late_s <= bench.time[-1]] * step + late_s
-    channels = []
-    for name, values in bench.signals().items():
-        own = name == "Q_Lmin"
-        start = START + np.timedelta64(round(1e3 * late_s) if own and by == "wf_start_time" else 0, "ms")
-        properties = {
-            "wf_start_time": start.astype("datetime64[us]"),
-            "wf_start_offset": late_s if own and by == "wf_start_offset" else 0.0,
-            "wf_increment": (step if own else 1.0) / RATE_HZ,
-            "unit_string": name.partition("_")[2].replace("Lmin", "L/min"),
-        }
-        data = np.interp(time, bench.time, values) if own else values
-        channels.append(ChannelObject("ramp", name.partition("_")[0], data, properties=properties))
-    out = io.BytesIO()
-    with TdmsWriter(out) as writer:
-        writer.write_segment(channels)
-    return out.getvalue()
-
-
-def hdf5(bench: Bench, late_s: float) -> bytes:
-    """Return an HDF5 file with a dataset of time for each quantity."""
-    import io
-
-    import h5py
-
-    time_q, q = shifted(bench, late_s)
-    out = io.BytesIO()
-    with h5py.File(out, "w") as file:
-        for name, values in {"t_u_s": bench.time, "u_V": bench.u, "t_dP_s": bench.time, "dP_MPa": bench.dp}.items():
-            file[name] = values
-        file["t_Q_s"], file["Q_Lmin"] = time_q, q
-    return out.getvalue()
 
 
 def mat(variables: Mapping[str, object]) -> bytes:
@@ -176,41 +124,3 @@ def mat(variables: Mapping[str, object]) -> bytes:
     out = io.BytesIO()
     savemat(out, dict(variables))
     return out.getvalue()
-
-
-def lvm(
-    bench: Bench,
-    x_columns: str,
-    units: Sequence[str] = ("V", "MPa", "L/min"),
-    names: Sequence[str] = ("u", "dP", "Q"),
-    segments: int = 1,
-    restart: bool = False,
-) -> bytes:
-    """Return a LabVIEW measurement file: X_Columns No, One or Multi, a header for each segment."""
-    head = [
-        "LabVIEW Measurement\t", "Writer_Version\t2", "Reader_Version\t2", "Separator\tTab", "Decimal_Separator\t,",
-        f"Multi_Headings\t{'Yes' if segments > 1 else 'No'}", f"X_Columns\t{x_columns}", "Time_Pref\tRelative",
-        "Operator\tuser", "Date\t2026/02/03", "Time\t08:00:00,0", "***End_of_Header***", "\t",
-    ]  # fmt: skip
-    between = "\t\t" if x_columns == "Multi" else "\t"
-    rows_each = -(-bench.time.size // segments)
-    for first in range(0, bench.time.size, rows_each):
-        rows = slice(first, first + rows_each)
-        begin = bench.time[first] if restart else 0.0
-        start = f"08:{int(begin // 60):02d}:{begin % 60:09.6f}".replace(".", ",")
-        sizes = [str(bench.time[rows].size)] * 3
-        head += [
-            f"Channels\t3{between}", *(f"{key}\t{between.join(values)}" for key, values in {
-                "Samples": sizes, "Date": ["2026/02/03"] * 3, "Time": [start] * 3, "Y_Unit_Label": units,
-                "X_Dimension": ["Time"] * 3, "X0": ["0,0"] * 3, "Delta_X": [f"{1 / RATE_HZ:.6f}".replace(".", ",")] * 3,
-            }.items()), "***End_of_Header***",
-        ]  # fmt: skip
-        head.append("\t".join(["X_Value", names[0], *(["X_Value"] if x_columns == "Multi" else []), names[1],
-                               *(["X_Value"] if x_columns == "Multi" else []), names[2], "Comment"]))  # fmt: skip
-        time = [f"{value:.6f}" for value in bench.time[rows] - begin]
-        x = [""] * len(time) if x_columns == "No" else time
-        columns = [[f"{value:.6f}" for value in values[rows]] for values in (bench.u, bench.dp, bench.q)]
-        parts = [x, columns[0], *([time] if x_columns == "Multi" else []), columns[1],
-                 *([time] if x_columns == "Multi" else []), columns[2]]  # fmt: skip
-        head += ["\t".join(row).replace(".", ",") for row in zip(*parts, strict=True)]
-    return ("\r\n".join(head) + "\r\n").encode()

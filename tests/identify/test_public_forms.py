@@ -13,7 +13,7 @@ import pytest
 
 from dzdesign.command_line.cli import main
 from tests.identify import public_forms as forms
-from tests.identify.public_forms import Bench, closing, csv, from_zero, levels, opening, plain, series, stamped, write
+from tests.identify.public_forms import Bench, closing, csv, from_zero, levels, opening, plain, series, write
 
 #: A knee is right within so many volts, or three of its standard errors.
 NEAR = 0.015
@@ -86,12 +86,6 @@ def check(form: Form, capsys) -> None:
 # Each channel has a clock of its own.
 
 
-def ended_early(bench: Bench, share: float):
-    """The flow's rows are laid one after the other, though its samples are further apart: its column ends first."""
-    kept = np.round(np.linspace(0, bench.q.size - 1, int(share * bench.q.size))).astype(int)
-    return csv({**plain(bench), "Q_Lmin": bench.q[kept]})
-
-
 def filled_up(bench: Bench, share: float, value: float | None):
     """The same, and the logger filled the column up to the end: with a number, or the last value."""
     kept = np.round(np.linspace(0, bench.q.size - 1, int(share * bench.q.size))).astype(int)
@@ -108,28 +102,7 @@ def own_times(bench: Bench, late_s: float, labels: Sequence[str]):
     )
 
 
-TIMES_ALIKE = ("Time (s)", "u (V)", "Time (s)", "dP (MPa)", "Time (s)", "Q (L/min)")
 TIMES_NAMED = ("time_u (s)", "u (V)", "time_dP (s)", "dP (MPa)", "time_Q (s)", "Q (L/min)")
-
-
-def twincat(bench: Bench) -> bytes:
-    """TwinCAT Scope's CSV: a block of properties and a timeline in ms for each channel."""
-    late = {"uCmd": 0, "fFlow": 7, "fDeltaP": 3}
-    signals = {"uCmd": bench.u, "fFlow": bench.q, "fDeltaP": bench.dp}
-    pairs = {"Name": "{}", "NetId": "5.1.2.3.1.1", "Port": "851", "SampleTime[ms]": "50", "SymbolName": "MAIN.{}",
-             "Data-Type": "REAL32"}  # fmt: skip
-    lines = [
-        "Name\tScope01",
-        "File\tC:\\x\\ramp.tcscope",
-        "StartRecord\t133800000000000000\tMontag, 3. Februar 2026\t13:08:42",
-        "",
-    ]
-    lines += ["\t".join(f"{key}\t{text.format(name)}" for name in signals) for key, text in pairs.items()] + [""]
-    measured = {name: np.interp(bench.time + late[name] / 1e3, bench.time, values) for name, values in signals.items()}
-    for row, time in enumerate(bench.time):
-        cells = [f"{round(1e3 * time) + late[name]}\t{measured[name][row]:.5f}" for name in signals]
-        lines.append("\t".join(cells).replace(".", ","))
-    return "\n".join(lines).encode()
 
 
 def another_time(bench: Bench, late_s: float, label: str, rate: float = 1.0, zero: float = 0.0):
@@ -140,21 +113,6 @@ def another_time(bench: Bench, late_s: float, label: str, rate: float = 1.0, zer
 
 
 CLOCKS = {
-    "tdms-start-time": Form(write=one(lambda bench: forms.tdms(bench, 0.24), "tdms", repeats=3)),
-    "tdms-start-early": Form(write=one(lambda bench: forms.tdms(bench, 1.5), "tdms")),
-    "tdms-start-offset": Form(write=one(lambda bench: forms.tdms(bench, 0.5, by="wf_start_offset"), "tdms")),
-    "tdms-other-increment": Form(write=one(lambda bench: forms.tdms(bench, step=2.0), "tdms")),
-    "hdf5-time-each": Form(write=one(lambda bench: forms.hdf5(bench, 0.24), "h5")),
-    "mat-time-each": Form(
-        write=one(
-            lambda bench: forms.mat(
-                {"t_u_s": bench.time, "u_V": bench.u, "t_dP_s": bench.time, "dP_MPa": bench.dp}
-                | dict(zip(("t_Q_s", "Q_Lmin"), forms.shifted(bench, 0.24), strict=True))
-            ),
-            "mat",
-        )
-    ),
-    "csv-times-alike": Form(write=one(lambda bench: own_times(bench, 0.24, TIMES_ALIKE))),
     "csv-times-named": Form(write=one(lambda bench: own_times(bench, 0.24, TIMES_NAMED))),
     **{
         f"csv-times-{label}": Form(
@@ -173,8 +131,6 @@ CLOCKS = {
     "csv-times-and-temperature": Form(write=one(lambda bench: another_time(bench, 0.0, "T_oil_degC", 0.01, zero=40.0))),
     "csv-times-and-count": Form(write=one(lambda bench: another_time(bench, 0.0, "t", forms.RATE_HZ))),
     "csv-times-rounded": Form(write=one(lambda bench: another_time(bench, 0.0, "elapsed_s", zero=0.002))),
-    "csv-column-shorter": Form(write=one(lambda bench: ended_early(bench, 0.995)), refused=("r1_0.csv", "Q_Lmin")),
-    "csv-column-much-shorter": Form(write=one(lambda bench: ended_early(bench, 0.8)), refused=("r1_0.csv", "Q_Lmin")),
     "csv-column-filled-with-zeros": Form(
         write=one(lambda bench: filled_up(bench, 0.99, 0.0)), refused=("r1_0.csv", "Q_Lmin")
     ),
@@ -184,44 +140,15 @@ CLOCKS = {
     "csv-column-filled-amid-flow": Form(
         write=one(lambda bench: filled_up(bench, 0.8, None)), refused=("r1_0.csv", "Q_Lmin")
     ),
-    "twincat-scope": Form(
-        write=one(twincat), options=("--columns", "u=uCmd:V,Q=fFlow:L/min,dP=fDeltaP:MPa")
-    ),
-    "lvm-one": Form(write=one(lambda bench: forms.lvm(bench, "One"), "lvm")),
-    "lvm-multi": Form(write=one(lambda bench: forms.lvm(bench, "Multi"), "lvm")),
-    "lvm-no": Form(write=one(lambda bench: forms.lvm(bench, "No"), "lvm")),
-    "lvm-default-names": Form(
-        write=one(lambda bench: forms.lvm(bench, "One", ["Volts"] * 3, ("Voltage_0", "Voltage_1", "Voltage_2")), "lvm"),
-        options=("--columns", "u=Voltage_0:V,dP=Voltage_1:MPa,Q=Voltage_2:L/min"),
-    ),
-    "lvm-segments": Form(write=one(lambda bench: forms.lvm(bench, "One", segments=4), "lvm")),
-    "lvm-segments-restart": Form(write=one(lambda bench: forms.lvm(bench, "One", segments=4, restart=True), "lvm")),
 }  # fmt: skip
 
-# Steps.
+# Steps from one level: the rest is in ramps/test_splitting.
 
 UP = list(np.linspace(4.6, 10, 28))
-RANDOM = list(np.random.default_rng(5).permutation(UP))
 
 STEPS = {
     "steps-from-zero": Form(
         write=one(plain, command=levels(from_zero(UP))), branches=("rising",), codes=("one-branch",), lag=()
-    ),
-    "steps-from-zero-falling-levels": Form(
-        write=one(plain, command=levels(from_zero(UP[::-1]))), branches=("rising",), codes=("one-branch",), lag=()
-    ),
-    "steps-from-below-the-threshold": Form(
-        write=one(plain, command=levels(from_zero(UP, base=2.0))), branches=("rising",), codes=("one-branch",), lag=()
-    ),
-    "steps-from-full-command": Form(
-        write=one(plain, command=levels(from_zero(UP[:-1], base=10.0))), branches=("falling",), codes=("one-branch",),
-        lag=(),
-    ),
-    "levels-in-no-order": Form(write=one(plain, command=levels([0, *RANDOM, 0])), refused=("r1_0.csv",), lag=()),
-    "staircase": Form(write=one(plain, command=levels([0, *UP, *UP[-2::-1], 0])), lag=()),
-    "alternating-steps": Form(
-        write=one(plain, command=levels([level for value in UP for level in (value, -value)])),
-        branches=("rising",), sides=("positive", "negative"), codes=("one-branch",), lag=(),
     ),
 }  # fmt: skip
 
@@ -268,11 +195,6 @@ def with_column(label: str, values: Callable[[Bench], np.ndarray], instead: str 
                           for name, column in plain(bench).items()}  # fmt: skip
 
 
-def unequal_columns(bench: Bench):
-    half = int(0.6 * bench.q.size)
-    return csv({**plain(bench), "Q_Lmin": bench.q[:half]})
-
-
 FLOWS = {
     "flow-clipped": Form(write=one(lambda bench: clipped(bench, 6.0)), codes=("flow-clipped",), drive_range=(0.468, 1)),
     "flow-at-20-mA": Form(
@@ -284,20 +206,6 @@ FLOWS = {
     "direction-bit": Form(write=one(direction_bit, benches=two_populations()), codes=("two-groups",), near=0.6),
     "one-solenoid-of-two": Form(
         write=one(two_columns, command=forms.both_sides, repeats=3), options=("--columns", "u=uA_V")
-    ),
-    "two-solenoids": Form(
-        write=one(two_columns, command=forms.both_sides), options=("--columns", "u=uA_V - uB_V"),
-        sides=("positive", "negative"),
-    ),
-    "two-solenoids-not-chosen": Form(write=one(two_columns, command=forms.both_sides), refused=("u=uA_V - uB_V",)),
-    "gauge-and-absolute": Form(
-        write=one(
-            lambda bench: {
-                "time_s": bench.time, "u_V": bench.u, "pA [bara]": 10 * bench.dp + 3.013,
-                "pB [barg]": np.full(bench.dp.size, 2.0), "Q_Lmin": bench.q,
-            }
-        ),
-        refused=("pA [bara]", "pB [barg]"),
     ),
     # Such a bound is too high by what the warning says: its zero error was below zero, and lost its sign.
     "flow-without-its-sign": Form(
@@ -315,34 +223,9 @@ FLOWS = {
         ),
         lag=(), codes=("command-late",),
     ),
-    "equal-labels": Form(
-        write=one(lambda bench: csv({**plain(bench), "Q_Lmin\0": 1.4 * bench.q})), refused=("Q_Lmin#2",)
-    ),
-    "equal-labels-chosen": Form(
-        write=one(lambda bench: csv({"time_s": bench.time, "u_V": bench.u, "dP_MPa": bench.dp, "Q_Lmin": bench.q + 1,
-                                     "Q_Lmin\0": bench.q})),
-        options=("--columns", "Q=Q_Lmin#2"),
-    ),
-    "reversed-valve": Form(
-        write=one(with_column("u_V", lambda bench: 10 - bench.u, "u_V")), refused=("u=u_V:10..0 V = 0..10 V",)
-    ),
-    "reversed-valve-turned": Form(
-        write=one(with_column("u_V", lambda bench: 10 - bench.u, "u_V")),
-        options=("--columns", "u=u_V:10..0 V = 0..10 V"),
-    ),
-    "meter-backwards": Form(
-        write=one(with_column("Q_Lmin", lambda bench: -bench.q)), refused=("Q=Q_Lmin:0..-1",)
-    ),
-    "meter-turned": Form(
-        write=one(with_column("Q_Lmin", lambda bench: -bench.q)), options=("--columns", "Q=Q_Lmin:0..-1 = 0..1 L/min")
-    ),
     "pulse-us": Form(
         write=one(with_column("pulse_us", lambda bench: 1500 + 40 * bench.u, "u_V"), command=forms.both_sides),
         options=("--columns", "u=pulse_us:1100..1900 = -10..10 V"), sides=("positive", "negative"),
-    ),
-    "speed-mm-per-s": Form(
-        write=one(with_column("speed_mm_per_s", lambda bench: bench.q / 0.12)),
-        options=("--columns", "Q=speed_mm_per_s:0..100 = 0..12 L/min"),
     ),
     "position": Form(
         write=one(with_column("pos_mm", lambda bench: totalled(bench, 100.0))), options=("--columns", "Q=pos_mm"),
@@ -351,96 +234,18 @@ FLOWS = {
     "volume": Form(
         write=one(with_column("Total_L", totalled)), options=("--columns", "Q=Total_L"), refused=("Total_L", "volume")
     ),
-    "volume-called-flow": Form(
-        write=one(with_column("Total_L", totalled)), options=("--columns", "Q=Total_L:L/min"), refused=("Total_L",)
-    ),
-    "pulses-called-flow": Form(
-        write=one(with_column("pulses", lambda bench: np.floor(totalled(bench, 500)))),
-        options=("--columns", "Q=pulses:L/min"), refused=("pulses",),
-    ),
-    "frequency": Form(
-        write=one(with_column("freq_Hz", lambda bench: bench.q * 500 / 60)),
-        options=("--columns", "Q=freq_Hz:0..500 Hz = 0..60 L/min"),
-    ),
-    "unequal-lengths": Form(write=one(unequal_columns), refused=("r1_0.csv", "Q_Lmin")),
     "fraction-called-percent": Form(
         write=one(with_column("u_%", lambda bench: bench.u / 10, "u_V")), refused=("r1_0.csv",)
     ),
-    "per-mille": Form(
-        write=one(with_column("u [promille]", lambda bench: 100 * bench.u, "u_V")),
-        options=("--columns", "u=u [promille]:0..1000 = 0..10 V"),
-    ),
 }  # fmt: skip
 
-# Cells: no value, spellings of time, other programs' files.
-
-MISSING = ("---", "--", "-----", "OL", "+OVER", "OVER", "Overload", "HI", "N/A", "NA", "NULL", "#N/A", "NaN", "+++++",
-           "Bad", "∞", "Inf", "1.#QNAN", "9.9E+37", "3.4E+38", "-9999", "9.91e37")  # fmt: skip
-
-
-def with_marker(marker: str):
-    def form(bench: Bench) -> bytes:
-        dp = [f"{value:.4f}" for value in bench.dp]
-        for row in range(7, len(dp), 41):
-            dp[row] = marker
-        return csv({**plain(bench), "dP_MPa": dp})
-
-    return form
-
-
-def duration(second: float) -> str:
-    return f"0 days 00:{int(second // 60):02d}:{second % 60:09.6f}"
-
-
-def named_month(second: float) -> str:
-    day = forms.date(second)
-    return f"03-Feb-2026 {day[11:]}"
-
-
-SPELLINGS = {
-    "seconds-with-unit": lambda second: f"{second:.3f} sec",
-    "pandas": duration,
-    "matlab": named_month,
-    "compact": lambda second: forms.date(second).replace("-", "").replace(":", ""),
-    "plc": lambda second: f"T#{round(1e3 * second)}ms",
-    "plc-date": lambda second: "DT#" + forms.date(second).replace("T", "-"),
-    "colon-before-ms": lambda second: forms.date(second)[11:].replace(".", ":"),
-    "two-digits": lambda second: "03.02.26 " + forms.date(second)[11:],
-    "offset": lambda second: forms.date(second) + "+01:00",
-}
-
-
-def set_back(second: float) -> str:
-    """Return local time on the night of the end of summer time."""
-    return f"25.10.2026 02:{59 if second < 30 else 0:02d}:{(second + 30) % 60:06.3f}"
-
-
-def excel_dates(bench: Bench) -> bytes:
-    months = ("Jan", "Feb", "Mrz", "Apr", "Mai", "Jun", "Jul", "Aug", "Sep", "Okt", "Nov", "Dez")
-    texts = []
-    for value in bench.q:
-        whole, part = f"{abs(value):.2f}".split(".")
-        texts.append(
-            f"{int(whole):02d}. {months[int(part) - 1]}" if 1 <= int(part) <= 12 else f"{value:.2f}".replace(".", ",")
-        )
-    return csv({**plain(bench), "Q_Lmin": texts}, separator=";")
+# Files of other programs.
 
 
 def long_format(bench: Bench) -> bytes:
     rows = [(f"{time:.3f}", f"plc.{name}", f"{values[row]:.4f}") for row, time in enumerate(bench.time)
             for name, values in bench.signals().items()]  # fmt: skip
     return csv(dict(zip(("timestamp", "path", "value"), zip(*rows, strict=True), strict=True)), separator=";")
-
-
-def mixed_units(bench: Bench) -> bytes:
-    texts = [f"{value:.4f} L/min" if value > 1 else f"{1e3 * value:.1f} mL/min" for value in bench.q]
-    return csv({**plain(bench), "Q_Lmin": texts})
-
-
-FIRST_BYTES = {
-    "MDF": b"MDF     4.10    ", "SQLite": b"SQLite format 3\0", "BLF": b"LOGG\x90\0\0\0", "DXD": b"DEWESoft\0\0",
-    "imc": b"|CF,2,1,1;|CK,1,3,1,1;",
-}  # fmt: skip
 
 
 def simulink(bench: Bench) -> bytes:
@@ -450,22 +255,7 @@ def simulink(bench: Bench) -> bytes:
 
 
 CELLS = {
-    **{f"missing-{marker}": Form(write=one(with_marker(marker), pressures=(3.0,)), codes=("missing-samples",))
-       for marker in MISSING if marker not in ("NaN", "#N/A", "---", "--", "-----")},
-    **{f"blank-{marker}": Form(write=one(with_marker(marker), pressures=(3.0,)))
-       for marker in ("NaN", "#N/A", "---", "--", "-----")},
-    "missing-declared": Form(
-        write=one(with_marker("kaputt"), pressures=(3.0,)), options=("--missing", "kaputt"), codes=("missing-samples",)
-    ),
-    "missing-undeclared": Form(write=one(with_marker("kaputt"), pressures=(3.0,)), refused=("kaputt", "--missing")),
-    **{f"time-{name}": Form(write=one(lambda bench, spell=spell: stamped(bench, spell), pressures=(3.0,)))
-       for name, spell in SPELLINGS.items()},
-    "clock-set-back": Form(write=one(lambda bench: stamped(bench, set_back)), refused=("r1_0.csv", "daylight saving")),
-    "excel-dates": Form(write=one(excel_dates), refused=("r1_0.csv", "Q_Lmin", "date")),
     "long-format": Form(write=one(long_format), refused=("r1_0.csv",)),
-    "units-in-cells": Form(write=one(mixed_units), refused=("r1_0.csv", "Q_Lmin")),
-    **{f"format-{name}": Form(write=one(lambda bench, start=start: start + bytes(4096), "dat"), refused=("r1_0.dat",))
-       for name, start in FIRST_BYTES.items()},
     "simulink-structure": Form(write=one(simulink, "mat"), refused=("r1_0.mat", "signals.values")),
     "units-spelt-otherwise": Form(
         write=one(

@@ -253,7 +253,6 @@ class TestReadability:
         assert "中_$x$_lang" in title.get_text()
         assert plot_files(found)["flow_1_MPa.png"].startswith(b"\x89PNG")
 
-
     def test_a_title_names_the_side_of_a_valve_with_two(self):
         """On either side the axis runs from zero up, so nothing else tells them apart."""
         tests = [ramp_of(dp) for dp in (1.0, 4.0)]

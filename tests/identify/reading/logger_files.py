@@ -194,8 +194,11 @@ def many_words():
 def graphtec():
     """Whole seconds and their milliseconds in two columns, a blank behind each sign."""
     times = [START + datetime.timedelta(seconds=float(time)) for time in TIME]
-    cells = [[f"{time:%Y/%m/%d %H:%M:%S}" for time in times], [f"{time.microsecond // 1000}" for time in times],
-             *([f"{value:+.4f}".replace("+", "+ ").replace("-", "- ") for value in each] for each in (U, 10 * DP, Q))]
+    cells = [
+        [f"{time:%Y/%m/%d %H:%M:%S}" for time in times],
+        [f"{time.microsecond // 1000}" for time in times],
+        *([f"{value:+.4f}".replace("+", "+ ").replace("-", "- ") for value in each] for each in (U, 10 * DP, Q)),
+    ]
     head = ['"Vendor","GRAPHTEC Corporation"', "NO.,Date&Time,ms,CH1,CH2,CH3", "NO.,Time,ms,V,bar,L/min"]
     return text(*head, *rows([str(index) for index in range(TIME.size)], *cells, separator=","), end="\r\n")
 

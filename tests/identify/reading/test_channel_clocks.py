@@ -189,6 +189,8 @@ def test_no_reading_is_made_up_over_a_pause(read):
 
 EVEN = {**LATE, "Q": clock(0.24, end=14.24)}
 NAMELESS = mat(EVEN).replace(b"t_u_s", b"t_x_s").replace(b"t_Q_s", b"t_y_s")
+
+
 def test_the_time_of_one_channel_is_not_taken_for_another_s(read):
     with pytest.raises(InputError, match="and which is that of 'Q_Lmin' can't be told"):
         read(NAMELESS, columns={"time": "t_x_s"})

@@ -124,7 +124,7 @@ def test_told_that_nothing_stands_above_the_first_line_is_the_header(here):
         ("time_s;u_V;dP_MPa;V [cm³]", "'V [cm³]' is a volume and no flow: differentiate it"),
         ("time_s;u_V;dP_MPa;pulses", "'pulses' counts pulses and is no flow: differentiate it"),
         ("time_s;u_V;dP_MPa;pos_mm", "'pos_mm' is a position and no flow: differentiate it; of a cylinder,"),
-        ("time_s;u_V;dP_MPa;speed_mm_per_s", "\"Q=speed_mm_per_s:0..100 mm/s = 0..12 L/min\""),
+        ("time_s;u_V;dP_MPa;speed_mm_per_s", '"Q=speed_mm_per_s:0..100 mm/s = 0..12 L/min"'),
         ("time_s;u_V;dP_MPa;v (m/s)", "'v (m/s)' is a speed: of a cylinder, the flow is area x speed"),
         ("VarName;TimeString;VarValue;Time_ms", "row for each variable (VarName, VarValue): export a column for each"),
     ],

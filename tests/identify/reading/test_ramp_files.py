@@ -63,6 +63,7 @@ def assert_is_the_ramp(test, rows=slice(None)):
     np.testing.assert_allclose(test.dp, 1e6 * DP[rows], rtol=1e-5)
     np.testing.assert_allclose(test.q, L_MIN * Q[rows], rtol=1e-5, atol=1e-15)
 
+
 @pytest.mark.parametrize("separator", [";", "\t"])
 def test_decimal_comma(read, separator):
     assert_is_the_ramp(read(table(HEADER.replace(",", separator), separator=separator, comma=True)))
@@ -154,6 +155,7 @@ def test_plain_rows_are_read_as_rows_with_a_comment_are(read, spoil, before):
     for name in ("time", "u", "q", "dp"):
         np.testing.assert_array_equal(getattr(plain, name), getattr(commented, name))
 
+
 def test_quoted_cells(read):
     quoted = re.sub(r"[^,\n]+", lambda cell: f'"{cell[0]}"', table())
     assert_is_the_ramp(read(quoted))
@@ -174,6 +176,7 @@ def test_blank_cells_are_missing_samples(read, blank):
         lines[row] = ",".join(cells)
     kept = [row for row in range(ROWS) if row + 1 not in (3, 7, 8)]
     assert_is_the_ramp(read("\n".join(lines)), kept)
+
 
 def test_columns_of_no_ramp_test_are_left_aside(read):
     header = "sample,time_s,oil temperature,u_V,dP_MPa,note,Q_Lmin,,"
