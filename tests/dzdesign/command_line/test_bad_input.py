@@ -1,6 +1,5 @@
 """Bad input through the command line: one line that says what and where, status 2, and no file touched."""
 
-import gzip
 import json
 import shutil
 import subprocess
@@ -83,68 +82,89 @@ def refusal(bench, capsys):
     return refusal
 
 
-# ramp tests
+# one table of what a command refuses, and of the words that name the fault and its place
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("content", "words"),
-    [
-        (b"", "is empty, comments and blank lines apart"),
-        (csv(ramp()).partition("\n")[2].encode(), "has no header row"),
-        (csv(ramp(), "time,u,dP,Q").encode(), "column 'time' has no unit"),
-        (csv(ramp(), "time_s,u_V,dP_xyz,Q_Lmin").encode(), "column 'dP_xyz': 'xyz' is not a unit of pressure"),
-        (csv(ramp(), "time_s,u_V,dP_V,Q_Lmin").encode(), "column 'dP_V': 'V' is not a unit of pressure"),
-        (csv(ramp(), "time_s,comand_V,dP_MPa,Q_Lmin").encode(), "no column of u"),
-        (csv(ramp(), "time_s,comand_V,dP_MPa,Q_Lmin").encode(), "u=comand_V"),
-        (csv(ramp(), "time_s,u_V,u [V],Q_Lmin").encode(), "two columns of u: 'u_V' and 'u [V]'"),
-        (csv(ramp(), "time_s,u_V,pA_MPa,Q_Lmin").encode(), "a column of pA but none of pB"),
-        (("# bench 3\n\n" + csv(ramp()) + "1,x,3,4\n").encode(), "row 1004, column 'u_V': 'x' is not a number"),
-        (("# bench 3\n\n" + csv(ramp()) + "1,2,1e30,4\n").encode(), "row 1004, column 'dP_MPa': '1e+30'"),
-        (("# bench 3\n\n" + csv(ramp()) + "1,2,3,4\n").encode(), "row 1004: the time goes back"),
-        ((csv(ramp()) + "1,2,3\n").encode(), "row 1002 has 3 cells, expected 4"),
-        ((csv(ramp()) + "1,2,3,4,5\n").encode(), "row 1002 has 5 cells, expected 4"),
-        (gzip.compress(csv(ramp()).encode(), mtime=0)[:-9], "is not a whole gzip file"),
-        (gzip.compress(csv(ramp()).encode(), mtime=0)[:99] + b"\0" * 9, "is not a whole gzip file"),
-        (csv(ramp()).encode("utf-16-le"), "is not a text file"),
-        (b"# 40 \x90C\n" + csv(ramp()).encode(), "is not a text file"),
-        (csv(ramp() * [1, 1, 1, 0]).encode(), "does not show the valve opening"),
-        (csv(ramp() * [1, 0, 1, 1]).encode(), "holds no ramp of the command"),
-        (csv(ramp() * [1, 1, -1, 1]).encode(), "swap pA and pB"),
-        (csv(ramp() * [1, 1.2, 1, 1]).encode(), "give --u-max"),
-        (csv(ramp(), "time_s,u_V,dP_mPa,Q_Lmin").encode(), "correct the unit in the header"),
-        (csv(ramp(1.0) * [1, 1, 500, 1]).encode(), "the pressure drop is 500 MPa"),
-        (
-            csv(np.column_stack([ramp()[:, 0], 2 * np.round(ramp()[:, 1] / 2), ramp(2.0)[:, 2:]])).encode(),
-            "at 1 levels of",
-        ),
-        (csv(ramp()[:19]).encode(), "has 19 complete rows, expected at least 20"),
-    ],
-)
-def test_a_bad_ramp_file(refusal, bench, content, words):
-    (bench / "bad.csv").write_bytes(content)
-    line = refusal("identify", "a.csv", "bad.csv")
-    assert words in line and "bad.csv" in line
+def of_columns(*columns, header=HEADER, scale=1):
+    """Return a recording in which some columns of the ramp are left, scaled."""
+    return csv((ramp() * scale)[:, columns], header).encode()
 
 
-@pytest.mark.parametrize(
-    ("name", "words"),
-    [
-        ("nowhere.csv", "does not exist"),
-        ("firmware", "is a folder"),
-        ("*.mat", "no file matches"),
-        ("a.csv/b", "does not"),
-    ],
-)
-def test_a_ramp_file_that_is_none(refusal, name, words):
-    line = refusal("identify", "a.csv", name)
-    assert words in line and name in line
+ALL = (0, 1, 2, 3)
+FIRMWARE = "dzdesign.firmware/1"
+BAD_RAMP, WITH_OPTIONS = "identify a.csv bad.csv", "design valve.json --config options.toml"
+#: Files that are written into the bench before, the command, and what its one line says.
+REFUSED = {
+    # ramp tests: how a file is read is in identify/reading/test_refusals.py
+    "no header": ({"bad.csv": csv(ramp()).partition("\n")[2]}, BAD_RAMP, "'bad.csv' has no header row"),
+    "no text": ({"bad.csv": csv(ramp()).encode("utf-16-le")}, BAD_RAMP, "'bad.csv' is not a text file"),
+    "no flow": ({"bad.csv": of_columns(*ALL, scale=[1, 1, 1, 0])}, BAD_RAMP, "does not show the valve opening"),
+    "no command": ({"bad.csv": of_columns(*ALL, scale=[1, 0, 1, 1])}, BAD_RAMP,
+                   "'bad.csv' holds no ramp of the command"),
+    "swapped ports": ({"bad.csv": of_columns(*ALL, scale=[1, 1, -1, 1])}, BAD_RAMP, "swap pA and pB"),
+    "above full command": ({"bad.csv": of_columns(*ALL, scale=[1, 1.2, 1, 1])}, BAD_RAMP, "give --u-max"),
+    "mPa": ({"bad.csv": of_columns(*ALL, header="time_s,u_V,dP_mPa,Q_Lmin")}, BAD_RAMP,
+            "correct the unit in the header"),
+    "500 MPa": ({"bad.csv": of_columns(*ALL, scale=[1, 1, 500, 1])}, BAD_RAMP, "the pressure drop is 500 MPa"),
+    "levels of 2 V": (
+        {"bad.csv": csv(np.column_stack([ramp()[:, 0], 2 * np.round(ramp()[:, 1] / 2), ramp(2.0)[:, 2:]]))},
+        BAD_RAMP, "at 1 levels of",
+    ),
+    "19 rows": ({"bad.csv": csv(ramp()[:19])}, BAD_RAMP, "has 19 complete rows, expected at least 20"),
+    "no pressure of one": ({"c.csv": of_columns(0, 1, 3, header="time_s,u_V,Q_Lmin")}, "identify a.csv c.csv",
+                           "'c.csv' has no column of dP"),
+    "a copy": ({"again.csv": csv(ramp(1.0))}, "identify a.csv again.csv",
+               "'again.csv' is an exact copy of the recording 'a.csv'; give it once"),
+    "no file": ({}, "identify a.csv nowhere.csv", "ramp file 'nowhere.csv' does not exist"),
+    "a folder": ({}, "identify a.csv firmware", "'firmware' is a folder"),
+    "no match": ({}, "identify a.csv *.mat", "no file matches '*.mat'"),
+    "below a file": ({}, "identify a.csv a.csv/b", "a.csv/b' does not"),
+    "a name that steers the terminal": ({}, ["identify", "two\nlines\x1b2J.csv"],
+                                        "ramp file 'two lines 2J.csv' does not exist"),
+    "options in UTF-16": ({"options.toml": "u-max = '10 V'".encode("utf-16")}, "identify a.csv --config options.toml",
+                          "'options.toml' is not TOML"),
+    # artefacts: what is no JSON is in core/test_artefact_types.py
+    "no JSON": ({"bad.json": ""}, "design bad.json -o new", "'bad.json' is not JSON"),
+    "another version": ({"bad.json": '{"schema": "dzdesign.valve/9"}'}, "design bad.json -o new",
+                        "'bad.json' has the schema 'dzdesign.valve/9'"),
+    "a compensator for a valve": ({}, "design compensator.json",
+                                  "has the schema 'dzdesign.compensator/1', expected dzdesign.valve/1"),
+    "a valve for a compensator": ({}, "codegen valve.json -o new", "which `dzdesign design` writes"),
+    "firmware for a compensator": ({}, "codegen firmware/manifest.json -o new", f"has the schema '{FIRMWARE}'"),
+    "C for a compensator": ({}, "codegen firmware/core/dz_comp.c -o new", "is not JSON"),
+    "no plant": ({}, "verify firmware --plant nowhere.toml", "plant file 'nowhere.toml' does not exist"),
+    "firmware of no schema": ({"firmware/manifest.json": "{}"}, "verify firmware",
+                              f"has the schema 'None', expected {FIRMWARE}"),
+    "firmware of no JSON": ({"firmware/manifest.json": "no JSON"}, "verify firmware", "is not JSON"),
+    "firmware without a tool": ({"firmware/manifest.json": f'{{"schema": "{FIRMWARE}"}}'}, "verify firmware",
+                                "lacks the key 'tool'"),
+    "firmware with a list of files": ({"firmware/manifest.json": f'{{"schema": "{FIRMWARE}", "files": []}}'},
+                                      "verify firmware", "'files' is [], expected object"),
+    "firmware of no compensator": ({"firmware/compensator.json": '{"schema": "dzdesign.compensator/1"}'},
+                                   "verify firmware", "lacks the key"),
+    "firmware without its compensator": ({"firmware/compensator.json": None}, "verify firmware",
+                                         "compensator.json' does not exist"),
+    # tables of options
+    "an option of the machine above": ({"options.toml": 'oil = "0.2 %"'}, WITH_OPTIONS, "oil"),
+    "no option of the machine": ({"options.toml": '[machine]\nguard = "mean"'}, WITH_OPTIONS, "guard"),
+    "a near miss of the machine": ({"options.toml": '[machine]\ncoil-temperatur = "20 degC"'},
+                                   WITH_OPTIONS, "coil-temperature"),
+    "no table of the machine": ({"options.toml": 'machine = "1 %"'}, WITH_OPTIONS, "machine"),
+    "a table in the machine": ({"options.toml": "[machine]\noil = {}"}, WITH_OPTIONS, "oil"),
+    "twice in the machine": ({"options.toml": '[machine]\nbench-coil = "20 degC"\nbench_coil = "20 degC"'},
+                             WITH_OPTIONS, "twice"),
+}  # fmt: skip
 
 
-def test_a_copy_is_no_repetition(refusal, bench):
-    shutil.copy("a.csv", "again.csv")
-    line = refusal("identify", "a.csv", "again.csv")
-    assert "'again.csv' is an exact copy of the recording 'a.csv'; give it once" in line
+@pytest.mark.parametrize("name", REFUSED)
+def test_it_is_refused_in_one_line(refusal, bench, name):
+    files, command, words = REFUSED[name]
+    for place, content in files.items():
+        (bench / place).unlink(missing_ok=True)
+        if content is not None:
+            (bench / place).write_bytes(content if isinstance(content, bytes) else content.encode())
+    line = refusal(*(command.split() if isinstance(command, str) else command))
+    assert words in line and all(Path(place).name in line for place in files)
 
 
 def test_a_recording_that_was_saved_again_is_no_repetition(refusal, bench, wording):
@@ -155,20 +175,11 @@ def test_a_recording_that_was_saved_again_is_no_repetition(refusal, bench, wordi
     wording("bad recordings: a copy that was saved again", refusal("identify", "a.csv", "again.csv"))
 
 
-def test_several_tests_without_pressure(refusal, bench):
-    (bench / "c.csv").write_text(csv(ramp()[:, [0, 1, 3]], "time_s,u_V,Q_Lmin"))
-    assert "'c.csv' has no column of dP" in refusal("identify", "a.csv", "c.csv")
-
-
 def test_a_valve_without_pressure_is_not_designed_for(refusal, bench, capsys):
     (bench / "c.csv").write_text(csv(ramp()[:, [0, 1, 3]], "time_s,u_V,Q_Lmin"))
     assert main(["identify", "c.csv", "-o", "c.json"]) == 0
     capsys.readouterr()
     assert "record the ramp test again with a column of dP" in refusal("design", "c.json")
-
-
-def test_a_file_name_that_steers_the_terminal(refusal):
-    assert "ramp file 'two lines 2J.csv' does not exist" in refusal("identify", "two\nlines\x1b2J.csv")
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows keeps its file names in Unicode")
@@ -281,11 +292,6 @@ def test_an_example_for_a_part_of_a_value_is_none_for_the_whole():
     assert in_words_of_the_file("'a.csv' has no column of u", "dz.toml", values) == "'a.csv' has no column of u"
 
 
-def test_a_file_of_options_that_is_no_text(refusal, bench):
-    (bench / "options.toml").write_bytes("u-max = '10 V'".encode("utf-16"))
-    assert "'options.toml' is not TOML" in refusal("identify", "a.csv", "--config", "options.toml")
-
-
 MACHINE_TABLE = """pressure-span = "25 MPa"
 
 [machine]
@@ -301,23 +307,6 @@ def test_the_machine_has_a_table_of_its_own(bench):
     arguments = parse(["design", "valve.json", "--config", "options.toml", "--supply", "20..30 V"]).arguments
     assert (arguments.coil_temperature, arguments.supply) == ("-20..80 degC", "20..30 V")
     assert arguments.pressure_span == "25 MPa"
-
-
-@pytest.mark.parametrize(
-    ("text", "key"),
-    [
-        ('oil = "0.2 %"', "oil"),
-        ('[machine]\nguard = "mean"', "guard"),
-        ('[machine]\ncoil-temperatur = "20 degC"', "coil-temperature"),
-        ('machine = "1 %"', "machine"),
-        ("[machine]\noil = {}", "oil"),
-        ('[machine]\nbench-coil = "20 degC"\nbench_coil = "20 degC"', "twice"),
-    ],
-)
-def test_a_table_of_the_machine_that_is_none_is_refused(bench, refusal, text, key):
-    (bench / "options.toml").write_text(text)
-    said = refusal("design", "valve.json", "--config", "options.toml")
-    assert "options.toml" in said and key in said
 
 
 def test_options_from_a_file_stand_in_for_the_defaults(bench, capsys):
@@ -468,33 +457,6 @@ def test_a_compensator_whose_value_does_not_fit(refusal, bench, path, change, wo
     assert words in refusal("codegen", "bad.json", "-o", "new")
 
 
-@pytest.mark.parametrize(
-    ("content", "words"),
-    [
-        (b"", "is not JSON"),
-        (HEADER.encode(), "is not JSON"),
-        (b'{"schema": "dzdesign.valve/1", "u_max_V": NaN}', "is not JSON (NaN is not a number of JSON)"),
-        (b'{"schema": "dzdesign.valve/1", "u_max_V": 1e999}', "is not JSON"),
-        (b'{"schema": "dzdesign.valve/1", "u_max_V": ' + b"[" * 9999, "is not JSON"),
-        ('{"schema": "dzdesign.valve/1"}'.encode("utf-16"), "is not JSON"),
-        (b"[]", "has the schema 'None', expected dzdesign.valve/1"),
-        (b'{"schema": "dzdesign.valve/9"}', "has the schema 'dzdesign.valve/9', expected dzdesign.valve/1"),
-    ],
-)
-def test_what_is_no_valve_at_all(refusal, bench, content, words):
-    (bench / "bad.json").write_bytes(content)
-    line = refusal("design", "bad.json", "-o", "new")
-    assert "'bad.json'" in line
-    assert words.partition(", expected")[0] in line
-
-
-def test_every_artefact_in_the_place_of_another(refusal):
-    assert "has the schema 'dzdesign.compensator/1', expected dzdesign.valve/1" in refusal("design", "compensator.json")
-    assert "which `dzdesign design` writes" in refusal("codegen", "valve.json", "-o", "new")
-    assert "has the schema 'dzdesign.firmware/1'" in refusal("codegen", "firmware/manifest.json", "-o", "new")
-    assert "is not JSON" in refusal("codegen", "firmware/core/dz_comp.c", "-o", "new")
-
-
 # where the output goes
 
 
@@ -581,30 +543,6 @@ def test_no_compiler_says_what_to_do(refusal, monkeypatch):
 def test_a_bad_plant(refusal, bench, text, wording):
     (bench / "plant.toml").write_text(text)
     wording(f"bad plant: {short(text)}", refusal("verify", "firmware", "--plant", "plant.toml"))
-
-
-def test_a_plant_that_is_not_there(refusal):
-    assert "plant file 'nowhere.toml' does not exist" in refusal("verify", "firmware", "--plant", "nowhere.toml")
-
-
-@needs_compiler
-@pytest.mark.parametrize(
-    ("name", "content", "words"),
-    [
-        ("manifest.json", "{}", "has the schema 'None', expected dzdesign.firmware/1"),
-        ("manifest.json", "no JSON", "is not JSON"),
-        ("manifest.json", '{"schema": "dzdesign.firmware/1"}', "lacks the key 'tool'"),
-        ("manifest.json", '{"schema": "dzdesign.firmware/1", "files": []}', "'files' is [], expected object"),
-        ("compensator.json", '{"schema": "dzdesign.compensator/1"}', "lacks the key"),
-        ("compensator.json", None, "compensator.json' does not exist"),
-    ],
-)
-def test_a_folder_that_is_no_firmware(refusal, bench, name, content, words):
-    path = bench / "firmware" / name
-    path.unlink()
-    if content is not None:
-        path.write_text(content)
-    assert words in refusal("verify", "firmware")
 
 
 @pytest.mark.slow
