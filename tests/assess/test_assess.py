@@ -138,9 +138,7 @@ def test_linearity_before_is_that_of_a_dead_zone():
 
 
 def test_flows_grow_as_the_root_of_the_pressure_drop_and_thresholds_stay():
-    found = assess(
-        [record(BEFORE, dp, seed=1) for dp in (1, 4)], [record(AFTER, dp, seed=2) for dp in (4, 1)], OPTIONS
-    )
+    found = assess([record(BEFORE, dp, seed=1) for dp in (1, 4)], [record(AFTER, dp, seed=2) for dp in (4, 1)], OPTIONS)
     assert [round(item.dp_MPa) for item in found.pressures] == [1, 4]
     low, high = (item.readings("after") for item in found.pressures)
     assert high["gain"].value == pytest.approx(2 * low["gain"].value, rel=5e-3)

@@ -15,11 +15,10 @@ from dzdesign.core.artefact_files import (
     write_file,
     write_folder,
 )
-from dzdesign.core.documents import parse_document, read_bytes, to_json
+from dzdesign.core.documents import read_bytes
 from dzdesign.core.errors import InputError, one_line
 from dzdesign.core.units import parse_quantity, si_factor
 
-NoneType = type(None)
 FIRMWARE, EVIDENCE = {"schema": "dzdesign.firmware/1"}, {"schema": "dzdesign.evidence/1"}
 FILES = {"core/a.c": "int a;\n", "README.md": "read me\n"}
 
@@ -230,43 +229,6 @@ def test_a_file_that_cannot_be_read(tmp_path, name, wording):
     with pytest.raises(InputError) as caught:
         read_bytes(tmp_path / name, "ramp file")
     wording(f"artefact files: reading {name!r}", str(caught.value))
-
-
-DOCUMENT = {"schema": "dzdesign.valve/1", "value": 1.5}
-
-
-@pytest.mark.parametrize(
-    "content",
-    [
-        b"",
-        b"time_s,u_V",
-        b"\xff\xfe{\0}\0",
-        json.dumps(DOCUMENT).encode("utf-16"),
-        b"\xef\xbb\xbf" + json.dumps(DOCUMENT).encode(),
-        b'{"schema": "dzdesign.valve/1", "value": NaN}',
-        b'{"schema": "dzdesign.valve/1", "value": -Infinity}',
-        b'{"schema": "dzdesign.valve/1", "value": 1e999}',
-        b'{"schema": "dzdesign.valve/1", "value": "\\ud800"}',
-        b'{"schema": "dzdesign.valve/1", "value": ' + b"9" * 5000 + b"}",
-        b'{"schema": "dzdesign.valve/1", "value": ' + b"[" * 5000 + b"]" * 5000 + b"}",
-        b"[" * 100_000,
-    ],
-)
-def test_what_is_not_json_is_refused_and_says_so(content):
-    with pytest.raises(InputError, match=r"'valve\.json' is not JSON"):
-        parse_document(content, "valve.json", ("dzdesign.valve/1",))
-
-
-@pytest.mark.parametrize(
-    "document", [{}, [], 1, "text", None, {"schema": "dzdesign.valve/2"}, {"schema": ["x" * 9999]}]
-)
-def test_another_schema_is_refused(document):
-    with pytest.raises(InputError, match=r"has the schema .{1,60}, expected dzdesign\.valve/1"):
-        parse_document(json.dumps(document).encode(), "valve.json", ("dzdesign.valve/1",))
-
-
-def test_a_document_written_is_the_document_read():
-    assert parse_document(to_json(DOCUMENT).encode(), "valve.json", ("dzdesign.valve/1",)) == DOCUMENT
 
 
 @pytest.mark.parametrize(

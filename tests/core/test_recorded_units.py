@@ -49,9 +49,7 @@ def test_what_is_recorded_in_V_MPa_and_L_min_stays_to_the_last_sign(value, form)
     assert AS_COMPUTED.text(value, ".4f dV") == f"{value:.4f} V"
 
 
-@given(
-    st.floats(-10, 10), st.integers(0, 4), st.floats(1e-6, 1e6), st.floats(-100, 100), st.sampled_from([1.0, -1.0])
-)
+@given(st.floats(-10, 10), st.integers(0, 4), st.floats(1e-6, 1e6), st.floats(-100, 100), st.sampled_from([1.0, -1.0]))
 def test_a_last_digit_means_as_much_in_any_unit(value, digits, size, at_zero, sign):
     """What is printed lies within half a digit, and that digit is worth a third to three times as much as in V."""
     units = RecordedUnits(command=CommandUnit(unit="x", at_zero=at_zero, factor=sign * size))

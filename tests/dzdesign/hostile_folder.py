@@ -108,13 +108,13 @@ def _settings(place: Path, outside: Path, canary: Path) -> None:
     touch = f"touch '{canary}/{{}}'"
     for name, text in {
         "ipopt.opt": f"output_file {outside}/ipopt.txt\nfile_print_level 5\nmax_iter 0\n",
-        ".octaverc": f"system(\"{touch.format('octaverc')}\");\n",
+        ".octaverc": f'system("{touch.format("octaverc")}");\n',
         ".gdbinit": f"shell {touch.format('gdbinit')}\n",
         "Makefile": f"all:\n\t{touch.format('make')}\n",
         "stdint.h": '#error "taken from the working folder"\n',
         "stdbool.h": '#error "taken from the working folder"\n',
         "specs": "*cpp:\n-include /etc/passwd\n",
-        ".git/config": f"[core]\n\tfsmonitor = \"{touch.format('fsmonitor')}\"\n\thooksPath = .git/hooks\n",
+        ".git/config": f'[core]\n\tfsmonitor = "{touch.format("fsmonitor")}"\n\thooksPath = .git/hooks\n',
         ".git/HEAD": "ref: refs/heads/main\n",
         ".git/hooks/post-index-change": f"#!/bin/sh\n{touch.format('hook')}\n",
         ".env": f"PYTHONSTARTUP={place}/json.py\n",

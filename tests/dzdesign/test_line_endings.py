@@ -32,8 +32,11 @@ def clone(folder, place):
 
 
 def endings(folder, ending):
-    return {path.relative_to(folder).as_posix() for path in folder.rglob("*")
-            if path.is_file() and ".git/" not in path.as_posix() and b"\r\n" in path.read_bytes()} >= ending
+    return {
+        path.relative_to(folder).as_posix()
+        for path in folder.rglob("*")
+        if path.is_file() and ".git/" not in path.as_posix() and b"\r\n" in path.read_bytes()
+    } >= ending
 
 
 @pytest.fixture(scope="module")

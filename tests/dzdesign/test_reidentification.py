@@ -114,8 +114,10 @@ class TestTheRecordings:
     def test_another_file_of_the_right_name_does_not_hold(self, valve, ramps, example_folder, tmp_path):
         shutil.copy(example_folder / "ramps" / "ramp_dP5_2.csv.gz", tmp_path / NAMES[3])
         check = tried(valve, [*in_folder(ramps)[:3], tmp_path / NAMES[3]])
-        assert check.holds is False and NAMES[3] in check.text and sha256_of((tmp_path / NAMES[3]).read_bytes()) in (
-            check.text
+        assert (
+            check.holds is False
+            and NAMES[3] in check.text
+            and sha256_of((tmp_path / NAMES[3]).read_bytes()) in (check.text)
         )
 
     def test_a_copy_beside_its_original_is_refused(self, valve, ramps, tmp_path):

@@ -13,7 +13,7 @@ import pytest
 
 from dzdesign.command_line.cli import main
 from tests.identify import public_forms as forms
-from tests.identify.public_forms import Bench, closing, csv, from_zero, levels, opening, plain, series, write
+from tests.identify.public_forms import Bench, closing, csv, opening, plain, series, write
 
 #: A knee is right within so many volts, or three of its standard errors.
 NEAR = 0.015
@@ -142,15 +142,6 @@ CLOCKS = {
     ),
 }  # fmt: skip
 
-# Steps from one level: the rest is in ramps/test_splitting.
-
-UP = list(np.linspace(4.6, 10, 28))
-
-STEPS = {
-    "steps-from-zero": Form(
-        write=one(plain, command=levels(from_zero(UP))), branches=("rising",), codes=("one-branch",), lag=()
-    ),
-}  # fmt: skip
 
 # Flow: the end of a range, two populations, the wrong quantity.
 
@@ -268,7 +259,7 @@ CELLS = {
     ),
 }  # fmt: skip
 
-FORMS = CLOCKS | STEPS | FLOWS | CELLS
+FORMS = CLOCKS | FLOWS | CELLS
 
 
 @pytest.mark.parametrize("name", FORMS)

@@ -214,6 +214,7 @@ def test_a_file_name_in_another_encoding(bench, capsys):
         "identify a.csv --meter-lag=-1s",
         "identify a.csv --meter-floor 1%",
         "identify a.csv --meter-floor 1000L/min",
+        *(f"identify a.csv --repeatability={text}" for text in ("0.1", "-1%", "12%", "nan%", "1e-3%", "5mV")),
         "identify a.csv --confidence 1",
         "identify a.csv --confidence 0.4",
         "identify a.csv --confidence nan",

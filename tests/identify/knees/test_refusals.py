@@ -11,7 +11,6 @@ import pytest
 from dzdesign.command_line.cli import main
 from dzdesign.core.errors import InputError
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.reading.ramp_files import read_ramp_file
 from dzdesign.identify.reading.ramp_test import Switch
 from tests.dzdesign.command_line.test_bad_input import csv
 from tests.support.repeatable_valves import identify
@@ -155,24 +154,6 @@ def test_thresholds_in_the_wrong_order_are_said_beyond_their_noise(hysteresis, s
     assert ("branch-order" in codes(*tests)) is said
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "Logger 3, made by hand\ntime_s,u_V,dP_MPa,Q_Lmin\n0,0,1,0\n",
-        "time_s,u_V,dP_MPa,Q_Lmin\n12:00,0,1,0\n",
-        "time_s,u_V,dP_MPa,Q_Lmin\n0,0,1,0\n2024-05-01 12:00:00,0,1,0\n",
-        "time_s,u_mA,dP_MPa,Q_Lmin\n0,4,1,0\n",
-        "time_s,u_V,dP_MPa,Q_Lmin\n0,4,1,0\n1,4,1,0\n2,4,1,0\n0,4,1,0\n",
-        "PK\x03\x04workbook",
-    ],
-)
-def test_what_loggers_write_is_refused_with_what_to_do(tmp_path, text, wording):
-    path = tmp_path / "ramp.csv"
-    path.write_text(text)
-    with wording.refusal(InputError):
-        read_ramp_file(path)
-
-
 @pytest.fixture
 def refused(tmp_path, monkeypatch, capsys):
     """Return the message about a recording of some columns, the label with its unit -> what stands in it."""
@@ -260,11 +241,6 @@ class TestPressureOnItsWay:
         tests = [self.recorded(1.0), self.recorded(4.0)]
         with wording.refusal(InputError):
             identify(tests)
-
-    def test_a_branch_that_nobody_recorded_is_another_matter(self):
-        one = synthetic_ramp(1.0, Truth(), falling=False)
-        with pytest.raises(InputError, match="record every pressure drop up and down"):
-            identify([one, synthetic_ramp(4.0, Truth(slope=8.0))])
 
 
 class TestPumpOffAtTheStart:

@@ -13,7 +13,6 @@ from dzdesign.core.artefact_types import as_document, to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.splitting import nominal_dp, split_ramps
-from dzdesign.identify.reading.ramp_files import ramp_file_bytes, read_ramp_file
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.model import ValveModel
 from tests.support.repeatable_valves import identify
@@ -107,24 +106,6 @@ class TestLaws:
         )
         assert_same_within_error([test], [longer])
 
-    @laws
-    @given(
-        seed=seeds,
-        units=st.sampled_from([("s", "V", "MPa", "Lmin"), ("ms", "mV", "bar", "m3/h"), ("min", "V", "psi", "mL/min")]),
-    )
-    def test_the_unit_of_a_column_does_not_matter(self, seed, units, tmp_path):
-        from dzdesign.core.units import si_factor
-
-        test = ramp(1.0, seed)
-        kinds = ("time", "voltage", "pressure", "flow")
-        names = ("time", "u", "dP", "Q")
-        arrays = (test.time, test.u, test.dp, test.q)
-        lines = [",".join(f"{name} [{unit}]" for name, unit in zip(names, units, strict=True))]
-        scaled = [array / si_factor(unit, kind) for array, unit, kind in zip(arrays, units, kinds, strict=True)]
-        lines += [",".join(f"{value:.12g}" for value in row) for row in zip(*scaled, strict=True)]
-        (tmp_path / "ramp.csv").write_text("\n".join(lines))
-        assert_same_within_error([test], [read_ramp_file(tmp_path / "ramp.csv")], 1e-4)
-
 
 class TestSplitting:
     def test_ramps_of_one_recording_are_those_of_many(self):
@@ -195,13 +176,6 @@ class TestSplitting:
         tests, found = thresholds([late], IdentifyOptions(meter_lag=0.5))
         known = np.array([[5.5 - 0.06 * test.dp_MPa, 5.4 - 0.06 * test.dp_MPa] for test in tests])
         np.testing.assert_allclose(found, known, atol=0.01)
-
-    def test_written_recording_reads_back_as_many_tests(self, tmp_path):
-        recording = one_after_another(ramp(1.0, 1), ramp(2.0, 2))
-        arrays = (recording.time, recording.u, recording.dp / MPA, recording.q * 6e4)
-        columns = dict(zip(("time_s", "u_V", "dP_MPa", "Q_Lmin"), arrays, strict=True))
-        (tmp_path / "all.csv").write_bytes(ramp_file_bytes(columns, (), compress=False))
-        assert len(identify([read_ramp_file(tmp_path / "all.csv")]).positive.tests) == 2
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.005])
