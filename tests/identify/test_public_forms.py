@@ -25,31 +25,28 @@ class Form:
     """Recordings, the options they are read with, and what is right.
 
     `write` writes them into the current folder and returns their names. `refused` holds what a message must name, such
-    as a column or the option that helps; empty: the branches are measured on the sides, at thresholds that lie by
+    as a column or the option that helps; empty: both branches are measured on the sides, at thresholds that lie by
     `shift` V higher, with the warnings of `codes` and none of `never`.
     """
 
     write: Callable[[], Sequence[str]]
     options: Sequence[str] = ()
-    lag: Sequence[str] = LAG
     refused: Sequence[str] = ()
-    branches: Sequence[str] = ("rising", "falling")
     sides: Sequence[str] = ("positive",)
     shift: float = 0.0
     codes: Sequence[str] = ()
     never: Sequence[str] = ()
-    drive_range: tuple[float, float] | None = None
     near: float = NEAR
 
 
-def one(form, suffix="csv", benches=None, **changes) -> Callable[[], Sequence[str]]:
+def one(form, suffix="csv", **changes) -> Callable[[], Sequence[str]]:
     """Return what writes a series in a form."""
-    return lambda: write(Path(), series(**changes) if benches is None else benches, form, suffix)
+    return lambda: write(Path(), series(**changes), form, suffix)
 
 
 def check(form: Form, capsys) -> None:
     names = form.write()
-    status = main(["-q", "identify", *names, *form.options, *form.lag, "-o", "valve.json"])
+    status = main(["-q", "identify", *names, *form.options, *LAG, "-o", "valve.json"])
     printed = capsys.readouterr()
     assert "Traceback" not in printed.err
     if form.refused:
@@ -71,16 +68,9 @@ def check(form: Form, capsys) -> None:
             assert test["dp_MPa"] == pytest.approx(nominal, abs=0.02)
             true = {"rising": opening(nominal) + form.shift, "falling": closing(nominal) + form.shift}
             for branch, threshold in true.items():
-                knee = test.get(f"u_knee_{branch}_V")
-                assert (knee is not None) == (branch in form.branches), (branch, knee)
-                if knee is not None:
-                    near = max(form.near, 3 * test[f"u_knee_{branch}_se_V"])
-                    assert knee == pytest.approx(threshold, abs=near), (branch, nominal)
-            guarded = "falling" if "falling" in form.branches else "rising"
-            assert test["u_guard_lower_V"] <= true[guarded]
-    if form.drive_range:
-        least, most = form.drive_range
-        assert least <= valve["sides"]["positive"]["k_x_max_over_u_max"] <= most
+                near = max(form.near, 3 * test[f"u_knee_{branch}_se_V"])
+                assert test[f"u_knee_{branch}_V"] == pytest.approx(threshold, abs=near), (branch, nominal)
+            assert test["u_guard_lower_V"] <= true["falling"]
 
 
 # Each channel has a clock of its own.
@@ -143,28 +133,7 @@ CLOCKS = {
 }  # fmt: skip
 
 
-# Flow: the end of a range, two populations, the wrong quantity.
-
-
-def clipped(bench: Bench, most: float):
-    return {**plain(bench), "Q_Lmin": np.minimum(bench.q, most)}
-
-
-def in_mA(bench: Bench, full: float = 12.0):
-    q_mA = np.minimum(4 + 16 * bench.q / full, 20.0)
-    return {"time_s": bench.time, "u_V": bench.u, "dP_MPa": bench.dp, "Q_mA": q_mA}
-
-
-def direction_bit(bench: Bench):
-    """An unsigned meter and a direction: the other side opens half a volt later."""
-    return {
-        "time_s": bench.time, "u_V": np.abs(bench.u), "DIR": np.full(bench.u.size, float(bench.shift_V == 0)),
-        "dP_MPa": bench.dp, "Q_Lmin": bench.q,
-    }  # fmt: skip
-
-
-def two_populations() -> list[Bench]:
-    return [Bench(dp_MPa=dp, seed=seed, shift_V=0.5 * (seed % 2)) for dp in forms.PRESSURES for seed in range(4)]
+# Flow: one side of two, a lost sign, the wrong quantity.
 
 
 def two_columns(bench: Bench):
@@ -187,14 +156,6 @@ def with_column(label: str, values: Callable[[Bench], np.ndarray], instead: str 
 
 
 FLOWS = {
-    "flow-clipped": Form(write=one(lambda bench: clipped(bench, 6.0)), codes=("flow-clipped",), drive_range=(0.468, 1)),
-    "flow-at-20-mA": Form(
-        write=one(in_mA, repeats=2), options=("--columns", "Q=Q_mA:4..20 mA = 0..12 L/min"), codes=("flow-clipped",),
-        drive_range=(0.468, 1),
-    ),
-    "true-stop": Form(write=one(plain, stop_V=8.2), never=("flow-clipped",), drive_range=(0.28, 0.32)),
-    # Taken for one, the knee lies between the two; the bound below that of the side that closes first.
-    "direction-bit": Form(write=one(direction_bit, benches=two_populations()), codes=("two-groups",), near=0.6),
     "one-solenoid-of-two": Form(
         write=one(two_columns, command=forms.both_sides, repeats=3), options=("--columns", "u=uA_V")
     ),
@@ -205,14 +166,6 @@ FLOWS = {
     ),
     "zero-with-its-sign": Form(
         write=one(with_column("Q_Lmin", lambda bench: np.abs(bench.q + 0.4))), never=("zero-hidden",)
-    ),
-    "command-late": Form(
-        write=one(
-            plain,
-            benches=[Bench(dp_MPa=dp, seed=seed, seconds=seconds, late=0.3) for dp in forms.PRESSURES
-                     for seed, seconds in enumerate((30.0, 60.0))],
-        ),
-        lag=(), codes=("command-late",),
     ),
     "pulse-us": Form(
         write=one(with_column("pulse_us", lambda bench: 1500 + 40 * bench.u, "u_V"), command=forms.both_sides),

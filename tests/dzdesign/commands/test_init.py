@@ -12,8 +12,6 @@ import numpy as np
 import pytest
 
 from dzdesign.command_line.cli import main
-from dzdesign.identify.reading.columns import propose_columns
-from dzdesign.identify.reading.series import pressures_in_name
 from tests.support.synthetic import L_MIN, MPA, Truth, synthetic_ramp
 
 LABELS = "Zeit (s),AO0 [V],Durchfluss [L/min],Temp [degC]"
@@ -441,16 +439,6 @@ def test_hostile_labels_stay_strings_of_toml(here):
     write("ramp.csv", 't_s,"A ""0\\x\x7f [V]",dP_MPa,Q_Lmin,"] = 1\x1b[2J #"', time, u, dp, q, q)
     text, _ = init_then_identify("ramp.csv")
     assert set(tomllib.loads(text)) == {"u-max", "columns"} and "\x1b" not in text
-
-
-def test_the_look_is_of_labels_and_units(here):
-    time, u, dp, q = columns_of(1.0)
-    write("ramp.csv", "Time (s),Vin (V),p1 (bar),p2 (bar),Flow (L/min)", time, u, dp, dp, q)
-    found = propose_columns(Path("ramp.csv"), {})
-    assert {name: column.label for name, column in found.proposed.items()} == {"u": "Vin (V)"}
-    assert set(found.known) == {"time", "Q"}
-    assert "is it the drop, pA or pB?" in found.unclear["dP"]
-    assert pressures_in_name("a_1.5MPa_40bar.csv") == () and pressures_in_name("ramp 12,5 Bar up.csv") == ("12.5 bar",)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="names that Windows has not")

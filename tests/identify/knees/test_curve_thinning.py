@@ -8,7 +8,7 @@ import pytest
 from dzdesign.core.artefact_types import RuleError
 from dzdesign.identify.identification import identify
 from dzdesign.identify.knees import curve_thinning
-from dzdesign.identify.knees.curve_thinning import TOLERANCE, evenly_spaced
+from dzdesign.identify.knees.curve_thinning import TOLERANCE
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.valve.recorded_curve import MOST_POINTS, MOST_SAMPLES, RecordedBranch, RecordedCurve
 from tests.support.synthetic import L_MIN, Truth, synthetic_ramp
@@ -128,13 +128,6 @@ def test_pace_and_sampling_are_those_of_the_recording():
     assert test.conditions.samples <= ramp.u.size
 
 
-@pytest.mark.parametrize("commands", [[3.0], [1.0, 2.0], [2.0, 1.0, 1.0, 5.0], list(range(100))])
-def test_evenly_spaced_samples_rise_and_reach_both_ends(commands):
-    u = np.array(commands, dtype=float)
-    kept = u[evenly_spaced(u)]
-    assert kept[0] == u.min() and kept[-1] == u.max() and np.all(np.diff(kept) >= 0)
-
-
 def branch(u=(0.0, 5.0, 10.0), q=(0.0, 0.0, 20.0)):
     return RecordedBranch(u_V=u, q_L_min=q, u_seen_V=5.1, error_L_min=0.0)
 
@@ -159,14 +152,6 @@ def test_where_a_flow_is_passed():
 def test_a_curve_that_is_none_is_refused(make, case, wording):
     with wording.refusal(RuleError):
         make()
-
-
-def test_points_are_found_in_few_rounds(monkeypatch):
-    """By halving, all stretches at once, whatever the number of samples."""
-    calls, kept = [], curve_thinning._least_squares
-    monkeypatch.setattr(curve_thinning, "_least_squares", lambda u, q, at: calls.append(at.size) or kept(u, q, at))
-    identify([bent_ramp(2.0)[0]])
-    assert len(calls) <= 2 * 9 and max(calls) <= MOST_POINTS
 
 
 def test_a_ramp_that_began_without_pressure_does_not_bend_the_curve(tmp_path):

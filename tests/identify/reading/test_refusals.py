@@ -253,7 +253,7 @@ REFUSED = {
     **{f"a sample rate, {maker}": (plain(clocks.MAKERS[maker](clocks.LATE), sample_rate=20.0), "--sample-rate")
        for maker in TIMES_OF_Q},
     "a sample rate, mat without units": (plain(clocks.mat(clocks.LATE, "t_{}"), sample_rate=20.0), "--sample-rate"),
-    **{f"the time of Q, {maker}": (plain(clocks.MAKERS[maker](clocks.LATE), columns={"time": label}), "is the column of time of 'u")
+    **{f"the time of Q, {maker}": (plain(clocks.MAKERS[maker](clocks.LATE), columns={"time": label}), "of time of 'u")
        for maker, label in TIMES_OF_Q.items()},
     **{f"{name} ends {rows} rows early": (plain(clocks.csv(**{name: rows})), f"'{clocks.LABELS[name]}' ends at row")
        for name, rows in (("Q", 7), ("Q", 280), ("u", 140), ("dP", 14), ("time", 9))},
