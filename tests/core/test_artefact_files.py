@@ -29,38 +29,12 @@ def tree(folder: Path) -> dict[str, bytes]:
     }
 
 
-def failing(error, calls_that_work=0):
-    """Return a stand-in for a function of `os` that works some times and then raises."""
-    real, count = os.replace, iter(range(10))
-
-    def stand_in(*arguments):
-        if next(count) < calls_that_work:
-            return real(*arguments)
-        raise error
-
-    return stand_in
-
-
 @pytest.fixture
 def folder(tmp_path):
     """A firmware folder as dzdesign leaves it."""
     folder = tmp_path / "firmware"
     write_folder(folder, FILES, FIRMWARE)
     return folder
-
-
-@pytest.mark.parametrize("step", ["fsync", "replace"])
-@pytest.mark.parametrize(
-    ("error", "becomes"),
-    [(OSError(28, "No space left on device"), InputError), (KeyboardInterrupt(), KeyboardInterrupt)],
-)
-def test_a_file_that_fails_half_way_leaves_the_old_one_and_nothing_else(tmp_path, monkeypatch, step, error, becomes):
-    path = tmp_path / "valve.json"
-    write_file(path, "old")
-    monkeypatch.setattr(os, step, failing(error))
-    with pytest.raises(becomes):
-        write_file(path, "new" * 100_000)
-    assert tree(tmp_path) == {"valve.json": b"old"}
 
 
 def test_a_file_is_written_in_utf_8(tmp_path):
@@ -196,23 +170,6 @@ def test_an_empty_folder_may_be_written_and_parents_are_made(tmp_path):
     for name in ("empty", "a/b/c"):
         write_folder(tmp_path / name, FILES, FIRMWARE)
         assert (tmp_path / name / "core" / "a.c").is_file()
-
-
-@pytest.mark.parametrize("calls_that_work", [0, 1])
-@pytest.mark.parametrize(
-    ("error", "becomes"),
-    [(OSError(28, "No space left on device"), InputError), (KeyboardInterrupt(), KeyboardInterrupt)],
-)
-def test_a_folder_that_fails_half_way_leaves_the_old_one(folder, monkeypatch, calls_that_work, error, becomes):
-    before = tree(folder)
-    broken, real = failing(error, calls_that_work), os.replace
-    calls = iter(range(10))
-    # The call after the failing one brings the old folder back.
-    monkeypatch.setattr(os, "replace", lambda *pair: (broken if next(calls) <= calls_that_work else real)(*pair))
-    with pytest.raises(becomes):
-        write_folder(folder, {"README.md": "new\n"}, FIRMWARE)
-    assert tree(folder) == before
-    assert [path.name for path in folder.parent.iterdir()] == ["firmware"]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="links need a privilege on Windows")

@@ -123,6 +123,13 @@ REFUSED = {
                                         "ramp file 'two lines 2J.csv' does not exist"),
     "options in UTF-16": ({"options.toml": "u-max = '10 V'".encode("utf-16")}, "identify a.csv --config options.toml",
                           "'options.toml' is not TOML"),
+    # where plots can't go
+    **{f"plots in {place!r}": ({}, ["identify", "a.csv", "-o", "new.json", "--plots", place], words)
+       for place, words in (
+        ("a.csv", "'a.csv' is a file, expected a folder"), ("a.csv/plots", "a.csv' is a file, expected a folder"),
+        ("", "--plots is empty"), ("new.json", "where -o puts a file"), ("new.json/plots", "where -o puts a file"),
+        ("no\0name", "can't be written"),
+    )},
     # artefacts: what is no JSON is in core/test_artefact_types.py
     "no JSON": ({"bad.json": ""}, "design bad.json -o new", "'bad.json' is not JSON"),
     "another version": ({"bad.json": '{"schema": "dzdesign.valve/9"}'}, "design bad.json -o new",
@@ -231,6 +238,8 @@ def test_a_file_name_in_another_encoding(bench, capsys):
         "codegen nowhere.json",
         "codegen compensator.json --target f28334",
         "derive --format htm",
+        *(f"simulate --dp 1MPa --repeats {number}" for number in ("0", "101", "two")),
+        *(f"simulate --dp 1MPa --repeatability {share}" for share in ("0.1", "11%")),
         "simulate --seed nan",
         "simulate --seed=-1",
         "simulate --ramp-time 0s",

@@ -4,7 +4,6 @@ import contextlib
 import inspect
 import io
 import json
-import os
 import re
 import shlex
 import shutil
@@ -31,14 +30,6 @@ from dzdesign.stages.recordings import distinct_names
 from dzdesign.terminal import progress
 from dzdesign.terminal.page import FILE_WIDTH, Table, new_console, put_line, put_table
 from tests.support.synthetic import L_MIN, MPA, Truth, synthetic_ramp
-
-
-def run(*words, **environment):
-    code = "import sys; from dzdesign.command_line.cli import main; sys.exit(main(sys.argv[1:]))"
-    return subprocess.run(
-        [sys.executable, "-c", code, *words], capture_output=True, text=True, check=False,
-        env={**os.environ, **environment},
-    )  # fmt: skip
 
 
 def help_of(*words, columns=80):

@@ -81,15 +81,6 @@ class TestLaws:
         assert_same_within_error(whole, [*halves, whole[1]], 0.3)
 
     @laws
-    @given(seed=seeds)
-    def test_a_repeated_test(self, seed):
-        once, twice = [ramp(1.0, seed)], [ramp(1.0, seed), ramp(1.0, seed + 1)]
-        (before,), (after,) = thresholds(once)[0], thresholds(twice)[0]
-        # Half of the data are the same; so is half of the error.
-        assert abs(after.u_knee_rising_V - before.u_knee_rising_V) < 2.5 * before.u_knee_se_V
-        assert abs(after.u_knee_rising_V - 5.44) < 4.5 * after.u_knee_se_V
-
-    @laws
     @given(seed=seeds, share=st.floats(0.1, 3.0))
     def test_more_samples_inside_the_dead_zone(self, seed, share):
         test = ramp(1.0, seed)
@@ -124,11 +115,6 @@ class TestSplitting:
         assert [file.source for file in valve.made_from] == ["all.csv", "b.csv"]
         text = to_json_bytes(valve).decode()
         assert to_json_bytes(read_artefact(text.encode(), ValveModel, "valve.json")).decode() == text
-
-    def test_repeating_shrinks_the_error(self):
-        once = thresholds([ramp(1.0, 1)])[0][0].u_knee_se_V
-        many = thresholds([one_after_another(*(ramp(1.0, seed) for seed in range(9)))])[0][0].u_knee_se_V
-        assert many == pytest.approx(once / 3, rel=0.4)
 
     def test_the_cut_in_a_hold_is_where_the_pressure_steps(self):
         recording = one_after_another(ramp(1.0), ramp(2.0), ramp(3.0), hold_s=20)
