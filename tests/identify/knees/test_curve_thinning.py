@@ -8,7 +8,7 @@ import pytest
 from dzdesign.core.artefact_types import RuleError
 from dzdesign.identify.identification import identify
 from dzdesign.identify.knees import curve_thinning
-from dzdesign.identify.knees.curve_thinning import TOLERANCE
+from dzdesign.identify.knees.curve_thinning import TOLERANCE, evenly_spaced
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.valve.recorded_curve import MOST_POINTS, MOST_SAMPLES, RecordedBranch, RecordedCurve
 from tests.support.synthetic import L_MIN, Truth, synthetic_ramp
@@ -126,6 +126,13 @@ def test_pace_and_sampling_are_those_of_the_recording():
     pace = np.ptp(ramp.u) / (np.ptp(ramp.time) / 2)
     assert test.conditions.rate_V_s == pytest.approx(pace, rel=0.03)
     assert test.conditions.samples <= ramp.u.size
+
+
+@pytest.mark.parametrize("commands", [[3.0], [1.0, 2.0], [2.0, 1.0, 1.0, 5.0], list(range(100))])
+def test_evenly_spaced_samples_rise_and_reach_both_ends(commands):
+    u = np.array(commands, dtype=float)
+    kept = u[evenly_spaced(u)]
+    assert kept[0] == u.min() and kept[-1] == u.max() and np.all(np.diff(kept) >= 0)
 
 
 def branch(u=(0.0, 5.0, 10.0), q=(0.0, 0.0, 20.0)):
