@@ -95,7 +95,7 @@ FIRMWARE = "dzdesign.firmware/1"
 BAD_RAMP, WITH_OPTIONS = "identify a.csv bad.csv", "design valve.json --config options.toml"
 #: Files that are written into the bench before, the command, and what its one line says.
 REFUSED = {
-    # ramp tests: how a file is read is in identify/reading/test_refusals.py
+    # ramp tests: how a file is read is in tests/identify/reading/test_refusals.py
     "no header": ({"bad.csv": csv(ramp()).partition("\n")[2]}, BAD_RAMP, "'bad.csv' has no header row"),
     "no text": ({"bad.csv": csv(ramp()).encode("utf-16-le")}, BAD_RAMP, "'bad.csv' is not a text file"),
     "no flow": ({"bad.csv": of_columns(*ALL, scale=[1, 1, 1, 0])}, BAD_RAMP, "does not show the valve opening"),
@@ -130,7 +130,7 @@ REFUSED = {
         ("", "--plots is empty"), ("new.json", "where -o puts a file"), ("new.json/plots", "where -o puts a file"),
         ("no\0name", "can't be written"),
     )},
-    # artefacts: what is no JSON is in core/test_artefact_types.py
+    # artefacts: what is no JSON is in tests/core/test_artefact_types.py
     "no JSON": ({"bad.json": ""}, "design bad.json -o new", "'bad.json' is not JSON"),
     "another version": ({"bad.json": '{"schema": "dzdesign.valve/9"}'}, "design bad.json -o new",
                         "'bad.json' has the schema 'dzdesign.valve/9'"),
