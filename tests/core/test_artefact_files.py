@@ -15,11 +15,10 @@ from dzdesign.core.artefact_files import (
     write_file,
     write_folder,
 )
-from dzdesign.core.documents import parse_document, read_bytes, to_json
+from dzdesign.core.documents import read_bytes
 from dzdesign.core.errors import InputError, one_line
 from dzdesign.core.units import parse_quantity, si_factor
 
-NoneType = type(None)
 FIRMWARE, EVIDENCE = {"schema": "dzdesign.firmware/1"}, {"schema": "dzdesign.evidence/1"}
 FILES = {"core/a.c": "int a;\n", "README.md": "read me\n"}
 
@@ -30,38 +29,12 @@ def tree(folder: Path) -> dict[str, bytes]:
     }
 
 
-def failing(error, calls_that_work=0):
-    """Return a stand-in for a function of `os` that works some times and then raises."""
-    real, count = os.replace, iter(range(10))
-
-    def stand_in(*arguments):
-        if next(count) < calls_that_work:
-            return real(*arguments)
-        raise error
-
-    return stand_in
-
-
 @pytest.fixture
 def folder(tmp_path):
     """A firmware folder as dzdesign leaves it."""
     folder = tmp_path / "firmware"
     write_folder(folder, FILES, FIRMWARE)
     return folder
-
-
-@pytest.mark.parametrize("step", ["fsync", "replace"])
-@pytest.mark.parametrize(
-    ("error", "becomes"),
-    [(OSError(28, "No space left on device"), InputError), (KeyboardInterrupt(), KeyboardInterrupt)],
-)
-def test_a_file_that_fails_half_way_leaves_the_old_one_and_nothing_else(tmp_path, monkeypatch, step, error, becomes):
-    path = tmp_path / "valve.json"
-    write_file(path, "old")
-    monkeypatch.setattr(os, step, failing(error))
-    with pytest.raises(becomes):
-        write_file(path, "new" * 100_000)
-    assert tree(tmp_path) == {"valve.json": b"old"}
 
 
 def test_a_file_is_written_in_utf_8(tmp_path):
@@ -199,23 +172,6 @@ def test_an_empty_folder_may_be_written_and_parents_are_made(tmp_path):
         assert (tmp_path / name / "core" / "a.c").is_file()
 
 
-@pytest.mark.parametrize("calls_that_work", [0, 1])
-@pytest.mark.parametrize(
-    ("error", "becomes"),
-    [(OSError(28, "No space left on device"), InputError), (KeyboardInterrupt(), KeyboardInterrupt)],
-)
-def test_a_folder_that_fails_half_way_leaves_the_old_one(folder, monkeypatch, calls_that_work, error, becomes):
-    before = tree(folder)
-    broken, real = failing(error, calls_that_work), os.replace
-    calls = iter(range(10))
-    # The call after the failing one brings the old folder back.
-    monkeypatch.setattr(os, "replace", lambda *pair: (broken if next(calls) <= calls_that_work else real)(*pair))
-    with pytest.raises(becomes):
-        write_folder(folder, {"README.md": "new\n"}, FIRMWARE)
-    assert tree(folder) == before
-    assert [path.name for path in folder.parent.iterdir()] == ["firmware"]
-
-
 @pytest.mark.skipif(sys.platform == "win32", reason="links need a privilege on Windows")
 def test_a_link_to_a_folder_stays_a_link(folder):
     link = folder.parent / "link"
@@ -230,43 +186,6 @@ def test_a_file_that_cannot_be_read(tmp_path, name, wording):
     with pytest.raises(InputError) as caught:
         read_bytes(tmp_path / name, "ramp file")
     wording(f"artefact files: reading {name!r}", str(caught.value))
-
-
-DOCUMENT = {"schema": "dzdesign.valve/1", "value": 1.5}
-
-
-@pytest.mark.parametrize(
-    "content",
-    [
-        b"",
-        b"time_s,u_V",
-        b"\xff\xfe{\0}\0",
-        json.dumps(DOCUMENT).encode("utf-16"),
-        b"\xef\xbb\xbf" + json.dumps(DOCUMENT).encode(),
-        b'{"schema": "dzdesign.valve/1", "value": NaN}',
-        b'{"schema": "dzdesign.valve/1", "value": -Infinity}',
-        b'{"schema": "dzdesign.valve/1", "value": 1e999}',
-        b'{"schema": "dzdesign.valve/1", "value": "\\ud800"}',
-        b'{"schema": "dzdesign.valve/1", "value": ' + b"9" * 5000 + b"}",
-        b'{"schema": "dzdesign.valve/1", "value": ' + b"[" * 5000 + b"]" * 5000 + b"}",
-        b"[" * 100_000,
-    ],
-)
-def test_what_is_not_json_is_refused_and_says_so(content):
-    with pytest.raises(InputError, match=r"'valve\.json' is not JSON"):
-        parse_document(content, "valve.json", ("dzdesign.valve/1",))
-
-
-@pytest.mark.parametrize(
-    "document", [{}, [], 1, "text", None, {"schema": "dzdesign.valve/2"}, {"schema": ["x" * 9999]}]
-)
-def test_another_schema_is_refused(document):
-    with pytest.raises(InputError, match=r"has the schema .{1,60}, expected dzdesign\.valve/1"):
-        parse_document(json.dumps(document).encode(), "valve.json", ("dzdesign.valve/1",))
-
-
-def test_a_document_written_is_the_document_read():
-    assert parse_document(to_json(DOCUMENT).encode(), "valve.json", ("dzdesign.valve/1",)) == DOCUMENT
 
 
 @pytest.mark.parametrize(

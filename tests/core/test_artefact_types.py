@@ -115,6 +115,7 @@ def refusal(document: object) -> str:
     assert (
         text.startswith("'pump.json'") and "\n" not in text and "`" not in text and "$" not in text.partition("[0-9")[0]
     )
+    assert len(text) < 500
     return text
 
 
@@ -272,6 +273,7 @@ TEXT = to_json_bytes(pump()).decode()
         (b"", "not JSON"),
         (b"[]", "has the schema 'None'"),
         (b'{"schema": 3}', "has the schema '3'"),
+        (b'{"schema": "' + b"x" * 9999 + b'"}', "has the schema 'xxx"),
         (TEXT.replace("pump/2", "valve/1").encode(), "has the schema 'dzdesign.valve/1', expected dzdesign.pump/2"),
         (TEXT.replace("pump/2", "pump/1").encode(), "has the schema 'dzdesign.pump/1', expected dzdesign.pump/2"),
     ],

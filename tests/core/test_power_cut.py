@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 from dzdesign.core.artefact_files import MANIFEST_NAME, write_file, write_files, write_folder
-from dzdesign.core.errors import InputError
 from dzdesign.core.placing import ABANDONED_S, UNPLACED
 
 FILES = {"core/a.c": "int a;\n", "README.md": "read\n"}
@@ -84,13 +83,6 @@ def test_a_replaced_folder_is_removed_only_after_the_new_name_is_on_the_disk(tmp
     write_folder(folder, {**FILES, "README.md": "new\n"}, FIRMWARE)
     new_name = steps.index(("rename", folder.stat().st_ino))
     assert new_name < steps.index(("sync", tmp_path.stat().st_ino), new_name) < steps.index(("remove", 0))
-
-
-def test_a_folder_without_a_manifest_is_still_somebodys(tmp_path):
-    (tmp_path / "firmware").mkdir()
-    (tmp_path / "firmware/empty.txt").write_bytes(b"")
-    with pytest.raises(InputError, match="not made by dzdesign"):
-        write_folder(tmp_path / "firmware", FILES, FIRMWARE)
 
 
 @pytest.mark.parametrize("write", [

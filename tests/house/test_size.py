@@ -13,7 +13,7 @@ from tests.support.paths import ROOT
 ROOM_SIZES = {
     "core": (2510, 15, 0),
     "derivation": (4703, 28, 325),
-    "identify": (16141, 93, 1064),
+    "identify": (16150, 93, 1064),
     "assess": (1577, 8, 0),
     "design": (6950, 31, 0),
     "codegen": (7522, 50, 7588),
@@ -22,7 +22,7 @@ ROOM_SIZES = {
     "dzdesign": (8729, 59, 161),
 }
 #: Lines of Python of what is not shipped, and of the files that the tests compare with.
-TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 45607, 14267, 8531
+TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 44989, 14438, 8531
 #: Options of all commands together; an option of two commands counts twice.
 OPTIONS = 165
 #: What a number may be above what is there, before it is to be lowered.

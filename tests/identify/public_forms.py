@@ -24,15 +24,12 @@ def closing(dp_MPa: float) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class Bench:
-    """One recording as the bench sees it: s, V, MPa, L/min; `late` s is how much later the command's column comes."""
+    """One recording as the bench sees it: s, V, MPa, L/min."""
 
     dp_MPa: float = 1.0
     seed: int = 0
     seconds: float = 60.0
     noise: float = 0.03
-    stop_V: float = 20.0
-    shift_V: float = 0.0
-    late: float = 0.0
     command: Callable[["Bench"], np.ndarray] | None = None
     time: np.ndarray = field(init=False)
     u: np.ndarray = field(init=False)
@@ -44,14 +41,14 @@ class Bench:
         random = np.random.default_rng([self.seed, round(1000 * self.dp_MPa)])
         time = np.arange(true_u.size) / RATE_HZ
         dp = self.dp_MPa + 0.003 * random.standard_normal(time.size)
-        knee = opening(self.dp_MPa) + self.shift_V - PLAY / 2
+        knee = opening(self.dp_MPa) - PLAY / 2
         spool, at = np.empty(true_u.size), float(true_u[0])
         for row, command in enumerate(true_u):
             at = min(max(at, command - PLAY / 2), command + PLAY / 2)
             spool[row] = at
-        size = np.clip(np.abs(spool) - knee, 0, self.stop_V - knee)
+        size = np.maximum(np.abs(spool) - knee, 0)
         q = 3 * np.sqrt(dp) * np.sign(spool) * size + self.noise * random.standard_normal(time.size)
-        rows = {"time": time, "u": np.interp(time - self.late, time, true_u), "dp": dp, "q": q}
+        rows = {"time": time, "u": true_u, "dp": dp, "q": q}
         for name, values in rows.items():
             object.__setattr__(self, name, values)
 
@@ -68,15 +65,6 @@ def triangle(bench: Bench) -> np.ndarray:
 def both_sides(bench: Bench) -> np.ndarray:
     one = triangle(bench)
     return np.concatenate([one, -one])
-
-
-def levels(values: Sequence[float], hold_s: float = 3.0) -> Callable[[Bench], np.ndarray]:
-    """Return a command of levels that are held one after the other."""
-    return lambda bench: np.repeat(np.asarray(values, dtype=float), int(hold_s * RATE_HZ))
-
-
-def from_zero(values: Sequence[float], base: float = 0.0) -> list[float]:
-    return [level for value in values for level in (base, value)] + [base]
 
 
 def series(pressures: Sequence[float] = PRESSURES, repeats: int = 1, **changes) -> list[Bench]:

@@ -6,17 +6,11 @@ import math
 import numpy as np
 import pytest
 
-from dzdesign.core.artefact_reading import read_artefact
-from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.identify.fit.ramp_model import Ramps
 from dzdesign.identify.fit.scatter import measure_scatter
 from dzdesign.identify.fitting.guarded_thresholds import Trend, find_trend
-from dzdesign.identify.knees.meter import find_meter_floor
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.ramps.command import sweep_direction
-from dzdesign.identify.ramps.splitting import split_ramps
-from dzdesign.identify.valve.model import ValveModel
 from tests.support.repeatable_valves import identify
 from tests.support.synthetic import L_MIN, Truth, synthetic_ramp
 
@@ -165,60 +159,7 @@ class TestLaw:
         assert lowered == pytest.approx(0.15 / slope, rel=0.25)
 
 
-class TestInvariance:
-    def test_order_of_files_does_not_matter(self):
-        tests = [synthetic_ramp(dp, Truth(knee_rising=falling_threshold(dp))) for dp in PRESSURES]
-        assert identify(tests) == identify(tests[::-1])
-
-    def test_samples_in_the_dead_zone_do_not_move_the_knee(self):
-        test = synthetic_ramp(1.0, Truth(), seed=4)
-        rest = np.arange(500) / 50.0
-        longer = dataclasses.replace(
-            test,
-            time=np.concatenate([rest, test.time + 10]),
-            u=np.concatenate([np.zeros(500), test.u]),
-            q=np.concatenate([np.zeros(500), test.q]),
-            dp=np.concatenate([np.full(500, test.dp[0]), test.dp]),
-        )
-        short, long = (identify([each]).positive.tests[0] for each in (test, longer))
-        # Readings at rest say how quiet the meter is, so how far down the straight part may be followed.
-        assert abs(long.u_knee_rising_V - short.u_knee_rising_V) < 0.5 * short.u_knee_se_V
-
-    def test_document_round_trip(self, falling_valve):
-
-        text = to_json_bytes(falling_valve).decode()
-        again = read_artefact(text.encode(), ValveModel, "valve.json")
-        assert to_json_bytes(again).decode() == text
-
-
 class TestParts:
-    @pytest.mark.parametrize("noise", [0.0, 0.05])
-    def test_sweeps_are_told_apart_through_noise_and_holds(self, noise):
-        up = np.linspace(0, 10, 1000)
-        u = np.concatenate([np.zeros(50), up, np.full(50, 10), up[::-1], np.zeros(50)])
-        u = u + noise * np.random.default_rng(1).standard_normal(u.size)
-        direction = sweep_direction(u)
-        assert np.all(direction[80:1040] == 1)
-        assert np.all(direction[1110:2080] == -1)
-
-    def test_a_recording_that_starts_at_the_top_has_both_branches(self):
-        down_up = np.concatenate([np.linspace(10, 0, 500), np.linspace(0, 10, 500)])
-        assert np.all(sweep_direction(down_up)[:490] == -1)
-        assert np.all(sweep_direction(down_up)[510:] == 1)
-
-    @pytest.mark.parametrize(("floor", "expected"), [(0.6, 0.6), (0.0, 0.0)])
-    def test_meter_floor_is_found_where_there_is_one(self, floor, expected):
-        test = synthetic_ramp(1.0, Truth(floor=floor, noise=0.05), rate_Hz=100)
-        rising, _ = split_ramps(test, 0.0)[0].branches
-        assert find_meter_floor([rising], 10.0) / L_MIN == pytest.approx(expected, abs=0.1)
-
-    def test_a_small_change_is_flat_however_significant(self):
-        dp, small = np.array([1.0, 2.0, 3.0]), np.array([5.0, 4.997, 4.994])
-        trend = trend_of(dp, small, 1e-5, 0.01)
-        assert trend.direction == "flat" and trend.p_value < 1e-9
-        assert trend_of(dp, small, 1e-5, 0.005).direction == "decreasing"
-        assert trend_of(dp, np.array([5.0, 4.98, 4.96]), 1e-3, 0.01).direction == "decreasing"
-
     def test_a_change_within_the_noise_is_flat_however_large(self):
         trend = trend_of(np.array([1.0, 2.0, 3.0]), np.array([5.0, 5.02, 5.06]), 0.03, 0.01)
         assert trend.direction == "flat" and 0.05 < trend.p_value < 0.5

@@ -13,7 +13,7 @@ import pytest
 
 from dzdesign.command_line.cli import main
 from tests.identify import public_forms as forms
-from tests.identify.public_forms import Bench, closing, csv, from_zero, levels, opening, plain, series, write
+from tests.identify.public_forms import Bench, closing, csv, opening, plain, series, write
 
 #: A knee is right within so many volts, or three of its standard errors.
 NEAR = 0.015
@@ -25,31 +25,28 @@ class Form:
     """Recordings, the options they are read with, and what is right.
 
     `write` writes them into the current folder and returns their names. `refused` holds what a message must name, such
-    as a column or the option that helps; empty: the branches are measured on the sides, at thresholds that lie by
+    as a column or the option that helps; empty: both branches are measured on the sides, at thresholds that lie by
     `shift` V higher, with the warnings of `codes` and none of `never`.
     """
 
     write: Callable[[], Sequence[str]]
     options: Sequence[str] = ()
-    lag: Sequence[str] = LAG
     refused: Sequence[str] = ()
-    branches: Sequence[str] = ("rising", "falling")
     sides: Sequence[str] = ("positive",)
     shift: float = 0.0
     codes: Sequence[str] = ()
     never: Sequence[str] = ()
-    drive_range: tuple[float, float] | None = None
     near: float = NEAR
 
 
-def one(form, suffix="csv", benches=None, **changes) -> Callable[[], Sequence[str]]:
+def one(form, suffix="csv", **changes) -> Callable[[], Sequence[str]]:
     """Return what writes a series in a form."""
-    return lambda: write(Path(), series(**changes) if benches is None else benches, form, suffix)
+    return lambda: write(Path(), series(**changes), form, suffix)
 
 
 def check(form: Form, capsys) -> None:
     names = form.write()
-    status = main(["-q", "identify", *names, *form.options, *form.lag, "-o", "valve.json"])
+    status = main(["-q", "identify", *names, *form.options, *LAG, "-o", "valve.json"])
     printed = capsys.readouterr()
     assert "Traceback" not in printed.err
     if form.refused:
@@ -71,26 +68,31 @@ def check(form: Form, capsys) -> None:
             assert test["dp_MPa"] == pytest.approx(nominal, abs=0.02)
             true = {"rising": opening(nominal) + form.shift, "falling": closing(nominal) + form.shift}
             for branch, threshold in true.items():
-                knee = test.get(f"u_knee_{branch}_V")
-                assert (knee is not None) == (branch in form.branches), (branch, knee)
-                if knee is not None:
-                    near = max(form.near, 3 * test[f"u_knee_{branch}_se_V"])
-                    assert knee == pytest.approx(threshold, abs=near), (branch, nominal)
-            guarded = "falling" if "falling" in form.branches else "rising"
-            assert test["u_guard_lower_V"] <= true[guarded]
-    if form.drive_range:
-        least, most = form.drive_range
-        assert least <= valve["sides"]["positive"]["k_x_max_over_u_max"] <= most
+                near = max(form.near, 3 * test[f"u_knee_{branch}_se_V"])
+                assert test[f"u_knee_{branch}_V"] == pytest.approx(threshold, abs=near), (branch, nominal)
+            assert test["u_guard_lower_V"] <= true["falling"]
 
 
 # Each channel has a clock of its own.
 
 
 def filled_up(bench: Bench, share: float, value: float | None):
-    """The flow's samples are further apart, and the logger filled its column up: with a number, or the last value."""
+    """The same, and the logger filled the column up to the end: with a number, or the last value."""
     kept = np.round(np.linspace(0, bench.q.size - 1, int(share * bench.q.size))).astype(int)
     tail = np.full(bench.q.size - kept.size, bench.q[kept[-1]] if value is None else value)
     return {**plain(bench), "Q_Lmin": np.concatenate([bench.q[kept], tail])}
+
+
+def own_times(bench: Bench, late_s: float, labels: Sequence[str]):
+    """A column of time before each quantity; equal labels are told apart behind a NUL, which is not written."""
+    time_q, q = forms.shifted(bench, late_s)
+    columns = (bench.time, bench.u, bench.time, bench.dp, time_q, q)
+    return csv(
+        {f"{label}\0{number}": column for number, (label, column) in enumerate(zip(labels, columns, strict=True))}
+    )
+
+
+TIMES_NAMED = ("time_u (s)", "u (V)", "time_dP (s)", "dP (MPa)", "time_Q (s)", "Q (L/min)")
 
 
 def another_time(bench: Bench, late_s: float, label: str, rate: float = 1.0, zero: float = 0.0):
@@ -101,15 +103,7 @@ def another_time(bench: Bench, late_s: float, label: str, rate: float = 1.0, zer
 
 
 CLOCKS = {
-    "mat-time-each": Form(
-        write=one(
-            lambda bench: forms.mat(
-                {"t_u_s": bench.time, "u_V": bench.u, "t_dP_s": bench.time, "dP_MPa": bench.dp}
-                | dict(zip(("t_Q_s", "Q_Lmin"), forms.shifted(bench, 0.24), strict=True))
-            ),
-            "mat",
-        )
-    ),
+    "csv-times-named": Form(write=one(lambda bench: own_times(bench, 0.24, TIMES_NAMED))),
     **{
         f"csv-times-{label}": Form(
             write=one(lambda bench, label=label: another_time(bench, 0.24, label)),
@@ -138,51 +132,8 @@ CLOCKS = {
     ),
 }  # fmt: skip
 
-# Steps.
 
-UP = list(np.linspace(4.6, 10, 28))
-RANDOM = list(np.random.default_rng(5).permutation(UP))
-
-STEPS = {
-    "steps-from-zero": Form(
-        write=one(plain, command=levels(from_zero(UP))), branches=("rising",), codes=("one-branch",), lag=()
-    ),
-    "steps-from-zero-falling-levels": Form(
-        write=one(plain, command=levels(from_zero(UP[::-1]))), branches=("rising",), codes=("one-branch",), lag=()
-    ),
-    "steps-from-below-the-threshold": Form(
-        write=one(plain, command=levels(from_zero(UP, base=2.0))), branches=("rising",), codes=("one-branch",), lag=()
-    ),
-    "steps-from-full-command": Form(
-        write=one(plain, command=levels(from_zero(UP[:-1], base=10.0))), branches=("falling",), codes=("one-branch",),
-        lag=(),
-    ),
-    "levels-in-no-order": Form(write=one(plain, command=levels([0, *RANDOM, 0])), refused=("r1_0.csv",), lag=()),
-    "staircase": Form(write=one(plain, command=levels([0, *UP, *UP[-2::-1], 0])), lag=()),
-    "alternating-steps": Form(
-        write=one(plain, command=levels([level for value in UP for level in (value, -value)])),
-        branches=("rising",), sides=("positive", "negative"), codes=("one-branch",), lag=(),
-    ),
-}  # fmt: skip
-
-# Flow: the end of a range, two populations, the wrong quantity.
-
-
-def in_mA(bench: Bench, full: float = 12.0):
-    q_mA = np.minimum(4 + 16 * bench.q / full, 20.0)
-    return {"time_s": bench.time, "u_V": bench.u, "dP_MPa": bench.dp, "Q_mA": q_mA}
-
-
-def direction_bit(bench: Bench):
-    """An unsigned meter and a direction: the other side opens half a volt later."""
-    return {
-        "time_s": bench.time, "u_V": np.abs(bench.u), "DIR": np.full(bench.u.size, float(bench.shift_V == 0)),
-        "dP_MPa": bench.dp, "Q_Lmin": bench.q,
-    }  # fmt: skip
-
-
-def two_populations() -> list[Bench]:
-    return [Bench(dp_MPa=dp, seed=seed, shift_V=0.5 * (seed % 2)) for dp in forms.PRESSURES for seed in range(4)]
+# Flow: one side of two, a lost sign, the wrong quantity.
 
 
 def two_columns(bench: Bench):
@@ -204,18 +155,7 @@ def with_column(label: str, values: Callable[[Bench], np.ndarray], instead: str 
                           for name, column in plain(bench).items()}  # fmt: skip
 
 
-def unequal_columns(bench: Bench):
-    half = int(0.6 * bench.q.size)
-    return csv({**plain(bench), "Q_Lmin": bench.q[:half]})
-
-
 FLOWS = {
-    "flow-at-20-mA": Form(
-        write=one(in_mA, repeats=2), options=("--columns", "Q=Q_mA:4..20 mA = 0..12 L/min"), codes=("flow-clipped",),
-        drive_range=(0.468, 1),
-    ),
-    # Taken for one, the knee lies between the two; the bound below that of the side that closes first.
-    "direction-bit": Form(write=one(direction_bit, benches=two_populations()), codes=("two-groups",), near=0.6),
     "one-solenoid-of-two": Form(
         write=one(two_columns, command=forms.both_sides, repeats=3), options=("--columns", "u=uA_V")
     ),
@@ -227,21 +167,9 @@ FLOWS = {
     "zero-with-its-sign": Form(
         write=one(with_column("Q_Lmin", lambda bench: np.abs(bench.q + 0.4))), never=("zero-hidden",)
     ),
-    "command-late": Form(
-        write=one(
-            plain,
-            benches=[Bench(dp_MPa=dp, seed=seed, seconds=seconds, late=0.3) for dp in forms.PRESSURES
-                     for seed, seconds in enumerate((30.0, 60.0))],
-        ),
-        lag=(), codes=("command-late",),
-    ),
     "pulse-us": Form(
         write=one(with_column("pulse_us", lambda bench: 1500 + 40 * bench.u, "u_V"), command=forms.both_sides),
         options=("--columns", "u=pulse_us:1100..1900 = -10..10 V"), sides=("positive", "negative"),
-    ),
-    "speed-mm-per-s": Form(
-        write=one(with_column("speed_mm_per_s", lambda bench: bench.q / 0.12)),
-        options=("--columns", "Q=speed_mm_per_s:0..100 = 0..12 L/min"),
     ),
     "position": Form(
         write=one(with_column("pos_mm", lambda bench: totalled(bench, 100.0))), options=("--columns", "Q=pos_mm"),
@@ -250,31 +178,12 @@ FLOWS = {
     "volume": Form(
         write=one(with_column("Total_L", totalled)), options=("--columns", "Q=Total_L"), refused=("Total_L", "volume")
     ),
-    "frequency": Form(
-        write=one(with_column("freq_Hz", lambda bench: bench.q * 500 / 60)),
-        options=("--columns", "Q=freq_Hz:0..500 Hz = 0..60 L/min"),
-    ),
-    "unequal-lengths": Form(write=one(unequal_columns), refused=("r1_0.csv", "Q_Lmin")),
     "fraction-called-percent": Form(
         write=one(with_column("u_%", lambda bench: bench.u / 10, "u_V")), refused=("r1_0.csv",)
     ),
-    "per-mille": Form(
-        write=one(with_column("u [promille]", lambda bench: 100 * bench.u, "u_V")),
-        options=("--columns", "u=u [promille]:0..1000 = 0..10 V"),
-    ),
 }  # fmt: skip
 
-# Cells: no value, other programs' files.
-
-
-def with_marker(marker: str):
-    def form(bench: Bench) -> bytes:
-        dp = [f"{value:.4f}" for value in bench.dp]
-        for row in range(7, len(dp), 41):
-            dp[row] = marker
-        return csv({**plain(bench), "dP_MPa": dp})
-
-    return form
+# Files of other programs.
 
 
 def long_format(bench: Bench) -> bytes:
@@ -290,10 +199,7 @@ def simulink(bench: Bench) -> bytes:
 
 
 CELLS = {
-    "missing": Form(write=one(with_marker("OL"), pressures=(3.0,)), codes=("missing-samples",)),
-    "blank": Form(write=one(with_marker("NaN"), pressures=(3.0,))),
     "long-format": Form(write=one(long_format), refused=("r1_0.csv",)),
-    "format-DXD": Form(write=one(lambda bench: b"DEWESoft\0\0" + bytes(4096), "dat"), refused=("r1_0.dat",)),
     "simulink-structure": Form(write=one(simulink, "mat"), refused=("r1_0.mat", "signals.values")),
     "units-spelt-otherwise": Form(
         write=one(
@@ -306,7 +212,7 @@ CELLS = {
     ),
 }  # fmt: skip
 
-FORMS = CLOCKS | STEPS | FLOWS | CELLS
+FORMS = CLOCKS | FLOWS | CELLS
 
 
 @pytest.mark.parametrize("name", FORMS)

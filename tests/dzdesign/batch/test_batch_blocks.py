@@ -1,6 +1,5 @@
 """`batch --calibration block`: one firmware and a block a valve; a valve that needs another firmware fails alone."""
 
-import csv
 import json
 import shutil
 from dataclasses import replace
@@ -23,7 +22,7 @@ from dzdesign.design.compensator import Compensator
 from dzdesign.report.lot.summary import LOT_SETTING
 from dzdesign.verify.exhaustive.block_check import BlockFirmware
 from dzdesign.verify.toolchain import host_compiler
-from tests.dzdesign.batch.test_batch import tree
+from tests.dzdesign.batch.test_batch import rows, tree
 from tests.support.many_valves import LOT_TOML, write_lot
 from tests.support.synthetic import needs_compiler
 
@@ -44,8 +43,8 @@ def made(tmp_path_factory):
     """The lot's list, what the batch made of it, and the compiler's commands."""
     folder = tmp_path_factory.mktemp("lot")
     write_lot(folder, len(TARGETS), 0, SEED)
-    rows = [f"{name},{name}/*.csv,{target},{name}-S" for name, target in TARGETS.items()]
-    (folder / "lot.csv").write_text("\n".join(["name,files,target,record.serial", *rows]), encoding="utf-8")
+    lines = [f"{name},{name}/*.csv,{target},{name}-S" for name, target in TARGETS.items()]
+    (folder / "lot.csv").write_text("\n".join(["name,files,target,record.serial", *lines]), encoding="utf-8")
     commands, run = [], host_compiler.run_compiler
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(host_compiler, "run_compiler", lambda *given: commands.append(given[0]) or run(*given))
@@ -102,15 +101,14 @@ def test_one_firmware_and_a_block_a_valve(made):
 
 def test_a_valve_that_needs_another_firmware_fails_alone_with_the_reason(made):
     _, output, _ = made
-    with open(output / "valves.csv", encoding="utf-8", newline="") as table:
-        rows = {row["name"]: row for row in csv.DictReader(table)}
-    assert [rows[name]["status"] for name in TARGETS] == ["ok", "ok", "failed"]
-    reason = rows["V0002"]["reason"]
+    table = {row["name"]: row for row in rows(output)}
+    assert [table[name]["status"] for name in TARGETS] == ["ok", "ok", "failed"]
+    reason = table["V0002"]["reason"]
     assert "another firmware" in reason and "target cortex-m4 instead of host" in reason
     left = {path.name for path in valve(output, "V0002").iterdir()}  # nothing that was found of a block it has not
     assert left == {"manifest.json", "valve.json", "compensator.json", "reason.txt"}
     octets = (valve(output, "V0001") / "calibration.bin").read_bytes()
-    assert rows["V0001"]["calibration_bin_sha256"] == sha256_of(octets)
+    assert table["V0001"]["calibration_bin_sha256"] == sha256_of(octets)
 
 
 def test_what_is_done_is_taken_up(made, capsys):
@@ -151,8 +149,7 @@ def test_what_is_verified_is_the_valves_block_and_no_firmware_stays(made, holds,
     assert text_of(block.serial) == "S1" and verified == block
     assert to_json_bytes(identified) == (alone / "valve.json").read_bytes()
     assert (alone / "evidence" / "verification.json").is_file() and not (alone / "firmware").exists()
-    with open(tmp_path / "out" / "valves.csv", encoding="utf-8", newline="") as table:
-        (row,) = csv.DictReader(table)
+    (row,) = rows(tmp_path / "out")
     assert (row["status"], row["reason"]) == (("ok", "") if holds else ("does not hold", "drive: one code off"))
 
 

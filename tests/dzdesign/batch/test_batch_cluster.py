@@ -1,6 +1,5 @@
 """`batch --dask`: a real scheduler and real workers as processes on 127.0.0.1, any of them killed in mid-run."""
 
-import csv
 import json
 import logging
 import os
@@ -24,9 +23,8 @@ from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_types import THIS_TOOL
 from dzdesign.core.documents import sha256_of
 from dzdesign.core.errors import InputError
-from dzdesign.design.design_choices import DesignChoices
-from dzdesign.stages.identify import IdentifyChoices
 from tests.dzdesign.batch.crashing_work import die_over_bad
+from tests.dzdesign.batch.test_batch import NOTHING, rows
 from tests.support.many_valves import LOT_TOML, write_lot
 from tests.support.paths import ROOT
 from tests.support.synthetic import needs_compiler
@@ -37,7 +35,6 @@ COUNT, SEED = 7, 7
 OPTIONS = ["--config", str(LOT_TOML), "--target", "host"]
 #: Each block is tried by the worker that makes it, and the lot's firmware is written here.
 BLOCKS = ["--calibration", "block"]
-NOTHING = dict(recordings=(), identify=IdentifyChoices(), design=DesignChoices(), target="host")
 
 
 def start(*arguments: str, folder: Path, deaths: int = 3) -> subprocess.Popen:
@@ -109,10 +106,9 @@ def test_a_worker_is_killed_in_mid_run_and_nothing_is_lost(cluster, tmp_path, mo
     assert main(["batch", "lot", "-o", "out", "--dask", address, *OPTIONS, *BLOCKS]) == 1
     killer.join(30)
     assert 2 <= len(at_the_kill) < COUNT, "the worker was not killed in mid-run"
-    with open(tmp_path / "out" / "valves.csv", encoding="utf-8", newline="") as table:
-        rows = list(csv.DictReader(table))
-    assert [row["name"] for row in rows] == [f"V{number:04d}" for number in range(COUNT)]
-    assert {row["name"] for row in rows if row["status"] != "ok"} == set(broken)
+    table = rows(tmp_path / "out")
+    assert [row["name"] for row in table] == [f"V{number:04d}" for number in range(COUNT)]
+    assert {row["name"] for row in table if row["status"] != "ok"} == set(broken)
     assert len(list(Path("out").glob("valves/*/calibration.bin"))) == COUNT - len(broken)
     assert main(["batch", "lot", "-o", "here", "--jobs", "1", *OPTIONS, *BLOCKS]) == 1
     for path in sorted(Path("here").rglob("*.*")):

@@ -1,7 +1,5 @@
 """`batch --outputs`: each valve has them; what is refused or does not hold is that valve's reason, with its output."""
 
-import csv
-import io
 import json
 import shutil
 from dataclasses import replace
@@ -29,7 +27,7 @@ from dzdesign.report.lot.table import read_manifest
 from dzdesign.stages import verify as verify_stage
 from dzdesign.verify.evidence import TriedInputs
 from dzdesign.verify.requirements import REPRODUCED
-from tests.dzdesign.batch.test_batch import NOTHING, tree
+from tests.dzdesign.batch.test_batch import NOTHING, rows, tree
 from tests.support.golden_firmware import golden_compensator
 from tests.support.many_valves import lot_options, write_lot
 
@@ -162,14 +160,10 @@ def batch(folder):
     return main(["batch", str(folder / "lot.csv"), "-o", str(folder / "out"), *options])
 
 
-def rows(folder):
-    text = (folder / "out" / "valves.csv").read_text(encoding="utf-8")
-    return {row["name"]: row for row in csv.DictReader(io.StringIO(text))}
-
-
 @pytest.mark.slow
 def test_each_valve_has_its_output_and_a_refused_one_its_reason(made):
-    out, table = made / "out", rows(made)
+    out = made / "out"
+    table = {row["name"]: row for row in rows(out)}
     assert {name: row["output.iec61131"] for name, row in table.items()} == {
         "V0000": "not verified", "V0001": "not verified", "V0002": "not made",
     }  # fmt: skip

@@ -4,7 +4,6 @@ import csv
 import io
 import json
 import shutil
-from pathlib import Path
 
 import polars
 import pytest
@@ -13,6 +12,7 @@ from dzdesign.batch.valves import valves_of
 from dzdesign.command_line.cli import main
 from dzdesign.report.lot.page import report_of_lot
 from dzdesign.report.lot.table import by_name, frame_of, read_table, table_files
+from tests.dzdesign.batch.test_batch import rows as rows_of
 from tests.support.html_pages import Page
 from tests.support.many_valves import LOT_TOML, lot_options, write_lot
 from tests.support.synthetic_lots import lot_rows, write_lot_folder
@@ -23,10 +23,6 @@ OPTIONS = ["--config", str(LOT_TOML), "--target", "host"]
 COUNTED = ["V1", "V2", "V9", "V10", "V11"]
 #: What a spreadsheet, CSV or a page could take for something else.
 HOSTILE = ["=cmd|'/c calc'!A0", "'=1", "''", "-1", "@SUM(A1)", "+49 89 1", 'a,"b"; c', "<b>x</b>", "0815", "ü"]
-
-
-def csv_rows(folder: Path) -> list[dict[str, str]]:
-    return list(csv.DictReader(io.StringIO((folder / "valves.csv").read_text(encoding="utf-8"))))
 
 
 def test_numbers_in_names_sort_as_numbers():
@@ -58,7 +54,7 @@ def counted(tmp_path_factory):
 
 
 def test_all_that_batch_writes_is_in_that_order_and_has_the_records(counted):
-    table = csv_rows(counted / "out")
+    table = rows_of(counted / "out")
     assert [row["name"] for row in table] == COUNTED and {row["status"] for row in table} == {"ok", "failed"}
     assert {(row["record.serial"], row["record.oil"]) for row in table} == {("0815", '\'=HLP 46, "40"')}
     frame = polars.read_parquet(counted / "out" / "valves.parquet")
@@ -92,10 +88,10 @@ def test_no_cell_is_a_formula_and_every_text_comes_back(tmp_path):
 def test_a_record_that_can_be_none_is_not_in_the_table(counted, tmp_path):
     """The valve fails, and says why; the other has its own serial number."""
     listing = tmp_path / "list.csv"
-    good = next(row["name"] for row in csv_rows(counted / "out") if row["status"] == "ok")
+    good = next(row["name"] for row in rows_of(counted / "out") if row["status"] == "ok")
     files = f"{counted}/lot/{good}/*.csv"
     listing.write_text(f'name,files,record.serial\nbad,{files},"{"x" * 300}"\ngood,{files},4711\nnone,{files},\n')
     assert main(["batch", str(listing), "-o", str(tmp_path / "out"), "--jobs", "1", *OPTIONS]) == 1
-    table = {row["name"]: row for row in csv_rows(tmp_path / "out")}
+    table = {row["name"]: row for row in rows_of(tmp_path / "out")}
     assert {name: row["record.serial"] for name, row in table.items()} == {"bad": "", "good": "4711", "none": ""}
     assert "300 characters" in table["bad"]["reason"]

@@ -133,14 +133,3 @@ def test_the_series_is_in_random_order_and_its_time_stamps_tell_it(example_folde
     assert abs(np.corrcoef(pressures, np.arange(18))[0, 1]) < 0.5
     ends = [ramp.started + ramp.time[-1] for ramp in ramps]
     assert all(after.started - end == pytest.approx(60, abs=1) for end, after in zip(ends, ramps[1:], strict=False))
-
-
-@needs_compiler
-@pytest.mark.parametrize(
-    "argv", ["--repeats 0", "--repeats 101", "--repeats two", "--repeatability 0.1", "--repeatability 11%"]
-)
-def test_a_series_that_can_not_be_is_refused(tmp_path, monkeypatch, argv, capsys, wording):
-    monkeypatch.chdir(tmp_path)
-    assert main(["simulate", "--dp", "1 MPa", *argv.split()]) == 2
-    wording(f"simulate: {argv}", capsys.readouterr().err)
-    assert not (tmp_path / "ramps").exists()

@@ -12,8 +12,6 @@ import numpy as np
 import pytest
 
 from dzdesign.command_line.cli import main
-from dzdesign.identify.reading.columns import propose_columns
-from dzdesign.identify.reading.series import pressures_in_name
 from tests.support.synthetic import L_MIN, MPA, Truth, synthetic_ramp
 
 LABELS = "Zeit (s),AO0 [V],Durchfluss [L/min],Temp [degC]"
@@ -116,13 +114,24 @@ def test_two_rates_tell_the_lag(here):
         ("t_s,u_V,Q1 [L/min],Q2 [L/min]", "Q: 'Q1 [L/min]' and 'Q2 [L/min]' could each be it"),
         ("t_s,AO0,p [bar],Q_Lmin", "u: no column has a unit of voltage"),
         ("t_s,I_valve [mA],dP [bar],Q_Lmin", "u: no column has a unit of voltage; if 'I_valve [mA]' is it, say"),
+        (
+            "t_s,u_V,dP_bar,Q [Hz]",
+            "Q: 'ramp.csv' column 'Q [Hz]': 'Hz' is not a unit of flow that dzdesign knows; expected for ex",
+        ),
+        (
+            "t_s,u [v],dP_bar,Q_Lmin",
+            "u: 'ramp.csv' column 'u [v]': 'v' is not a unit of voltage that dzdesign knows (did you mean 'V'?)",
+        ),
+        ("t_s,u_V,dP_bar,Q_mA", "Q: 'ramp.csv' column 'Q_mA': 'mA' is not a unit of flow"),
     ],
 )
 def test_what_can_not_be_told_is_left_open_with_the_reason(here, capsys, labels, reason):
     time, u, dp, q = columns_of(1.0)
     write("ramp.csv", labels, time, u, dp, q)
     assert main(["init", "ramp.csv"]) == 1
-    assert f"open: column of {reason}" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert f"open: column of {reason}" in said
+    assert ("say what the signal means, for example" in said) == ("Q_mA" in labels)
     text = Path("dzdesign.toml").read_text()
     assert f"# OPEN: column of {reason}" in text and f'# {reason[0]} = "LABEL:UNIT"' in text
     assert reason[0] not in tomllib.loads(text).get("columns", {})
@@ -321,23 +330,6 @@ def test_without_a_pressure_the_template_has_lines_for_a_drop_and_for_two_sensor
     assert '# pA = "LABEL:UNIT"\n# pB = "LABEL:UNIT"\n' in text
 
 
-@pytest.mark.parametrize(
-    ("labels", "reason"),
-    [
-        ("t_s,u_V,dP_bar,Q [Hz]", "'Q [Hz]': 'Hz' is not a unit of flow that dzdesign knows; expected for ex"),
-        ("t_s,u [v],dP_bar,Q_Lmin", "'u [v]': 'v' is not a unit of voltage that dzdesign knows (did you mean 'V'?)"),
-        ("t_s,u_V,dP_bar,Q_mA", "'Q_mA': 'mA' is not a unit of flow"),
-    ],
-)
-def test_a_unit_that_is_none_of_its_quantity_is_open(here, capsys, labels, reason):
-    time, u, dp, q = columns_of(1.0)
-    write("ramp.csv", labels, time, u, 10 * dp, q)
-    assert main(["init", "ramp.csv"]) == 1
-    said = capsys.readouterr().out
-    assert f"open: column of {reason[1]}: 'ramp.csv' column {reason}" in said
-    assert ("say what the signal means, for example" in said) == ("mA" in reason)
-
-
 @pytest.mark.parametrize("dither", [0.0, 0.006])
 def test_names_that_contradict_the_column_are_said(here, capsys, dither):
     """A sensor that is stuck at 1 MPa: by one recording the name tells it, by several the flows as well."""
@@ -441,16 +433,6 @@ def test_hostile_labels_stay_strings_of_toml(here):
     write("ramp.csv", 't_s,"A ""0\\x\x7f [V]",dP_MPa,Q_Lmin,"] = 1\x1b[2J #"', time, u, dp, q, q)
     text, _ = init_then_identify("ramp.csv")
     assert set(tomllib.loads(text)) == {"u-max", "columns"} and "\x1b" not in text
-
-
-def test_the_look_is_of_labels_and_units(here):
-    time, u, dp, q = columns_of(1.0)
-    write("ramp.csv", "Time (s),Vin (V),p1 (bar),p2 (bar),Flow (L/min)", time, u, dp, dp, q)
-    found = propose_columns(Path("ramp.csv"), {})
-    assert {name: column.label for name, column in found.proposed.items()} == {"u": "Vin (V)"}
-    assert set(found.known) == {"time", "Q"}
-    assert "is it the drop, pA or pB?" in found.unclear["dP"]
-    assert pressures_in_name("a_1.5MPa_40bar.csv") == () and pressures_in_name("ramp 12,5 Bar up.csv") == ("12.5 bar",)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="names that Windows has not")

@@ -2,7 +2,6 @@
 
 import ast
 import gzip
-import json
 import re
 import string
 from dataclasses import replace
@@ -552,9 +551,3 @@ class TestOrder:
     def test_an_unknown_one_comes_last(self):
         two = [Warning_(code=code, text="", source=None) for code in ("unheard-of", "thinned")]
         assert most_serious_first(two) == tuple(reversed(two))
-
-
-def test_warnings_reach_the_file(tmp_path):
-    document = as_document(identify([replace(valve_at(1.0), simulated=True)]))
-    assert document["warnings"][0]["code"] == "simulated"
-    assert json.loads(to_json(document))["warnings"][0]["source"] == "ramp_dP1.csv"

@@ -260,3 +260,9 @@ def test_tests_that_contradict_a_premise_say_so_and_others_do_not(curve, curvatu
     # Of 60 true ones 0.6 lie below 1 %.
     assert np.sum(p_values("line") < 0.01) <= 4
     assert np.mean(p_values(shape) < 0.01) > 0.9
+
+
+@pytest.mark.parametrize(("confidence", "expected"), [(0.99, 2.62), (0.8, 0.87), (0.5, 0.0)])
+def test_a_critical_of_one_sum_is_student_s_at_any_confidence(confidence, expected):
+    """One ramp with 14 degrees of freedom, one-sided; at low confidence less than a standard deviation."""
+    assert critical(np.ones((1, 1)), 14.0, 0.0, 1 - confidence) == pytest.approx(expected, abs=0.04)

@@ -7,17 +7,13 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from dzdesign.command_line.cli import main
-from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
 from dzdesign.identify.fit import certificate, ramp_model, scatter
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.splitting import Ramp
-from dzdesign.identify.reading.ramp_files import ramp_file_bytes
 from dzdesign.identify.reading.ramp_test import RampTest
-from dzdesign.identify.valve.model import ValveModel
-from tests.support.synthetic import L_MIN, MPA, Truth, synthetic_ramp
+from tests.support.synthetic import Truth, synthetic_ramp
 
 PRESSURES = (1.0, 2.0, 3.0, 5.0)
 ALL_THRICE = tuple(range(len(PRESSURES))) * 3
@@ -245,54 +241,3 @@ class TestOrder:
         repeatability = found([whole])
         assert repeatability.drift_V == pytest.approx(0.08, abs=4 * repeatability.drift_se_V)
         assert repeatability.degrees_of_freedom == len(ALL_THRICE) - len(PRESSURES) - 1
-
-
-class TestOption:
-    """`--order` and `--repeatability`, on the command line."""
-
-    @pytest.fixture
-    def here(self, tmp_path, monkeypatch):
-        monkeypatch.chdir(tmp_path)
-        taken = series((0, 3, 3, 0, 0, 3), scatter=0.003, drift=0.08, seed=12)
-        for place, test in enumerate(taken.tests):
-            columns = {"time_s": test.time, "u_V": test.u, "dP_MPa": test.dp / MPA, "Q_Lmin": test.q / L_MIN}
-            (tmp_path / f"{5 * place % 6}.csv").write_bytes(ramp_file_bytes(columns, (), compress=False))
-            start = np.datetime64("2026-03-29T01:59:50.000") + np.timedelta64(100 * place, "s")
-            stamps = np.datetime_as_string(start + np.round(1e3 * test.time).astype("timedelta64[ms]"))
-            columns = {"time": stamps, **{key: column for key, column in columns.items() if key != "time_s"}}
-            (tmp_path / f"dated{5 * place % 6}.csv").write_bytes(ramp_file_bytes(columns, (), compress=False))
-        return tmp_path
-
-    @staticmethod
-    def identified(*argv) -> ValveModel:
-        from pathlib import Path
-
-        assert main(["-q", "identify", *argv, "--meter-lag", "0 s"]) == 0
-        return read_artefact(Path("valve.json").read_bytes(), ValveModel, "valve.json")
-
-    def test_it_says_what_time_stamps_do(self, here):
-        names = [f"{5 * place % 6}.csv" for place in range(6)]
-        dated = self.identified(*sorted(f"dated{name}" for name in names)).positive.certificate.repeatability
-        assert dated.drift_V == pytest.approx(0.08, abs=0.02)
-        unknown = self.identified(*sorted(names)).positive.certificate.repeatability
-        assert unknown.drift_V is None
-        told = self.identified(*sorted(names), "--order", ", ".join(names)).positive.certificate.repeatability
-        assert told.drift_V == pytest.approx(dated.drift_V, abs=2e-3)
-        backwards = self.identified(*sorted(names), "--order", ",".join(names[::-1]))
-        assert backwards.positive.certificate.repeatability.drift_V == pytest.approx(-told.drift_V, abs=2e-3)
-
-    @pytest.mark.parametrize(
-        "order",
-        ["0.csv, 1.csv, 2.csv, 3.csv, 4.csv, 6.csv", "0.csv, 1.csv, 2.csv, 3.csv, 4.csv", "0.csv, 0.csv, 1.csv, 2.csv, "
-        "3.csv, 4.csv, 5.csv", ""],
-        ids=["unknown", "missing", "twice", "empty"],
-    )  # fmt: skip
-    def test_an_order_that_is_none_is_refused(self, here, order, capsys, wording, request):
-        names = sorted(path.name for path in here.glob("?.csv"))
-        assert main(["-q", "identify", *names, "--order", order]) == 2
-        wording(f"order: {request.node.callspec.id}", capsys.readouterr().err)
-
-    @pytest.mark.parametrize("text", ["0.1", "-1 %", "12 %", "nan %", "1e-3 %", "5 mV"])
-    def test_a_repeatability_that_is_none_is_refused(self, here, text, capsys, wording):
-        assert main(["-q", "identify", "0.csv", f"--repeatability={text}"]) == 2
-        wording(f"repeatability: {text}", capsys.readouterr().err)

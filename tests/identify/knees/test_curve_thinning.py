@@ -161,14 +161,6 @@ def test_a_curve_that_is_none_is_refused(make, case, wording):
         make()
 
 
-def test_points_are_found_in_few_rounds(monkeypatch):
-    """By halving, all stretches at once, whatever the number of samples."""
-    calls, kept = [], curve_thinning._least_squares
-    monkeypatch.setattr(curve_thinning, "_least_squares", lambda u, q, at: calls.append(at.size) or kept(u, q, at))
-    identify([bent_ramp(2.0)[0]])
-    assert len(calls) <= 2 * 9 and max(calls) <= MOST_POINTS
-
-
 def test_a_ramp_that_began_without_pressure_does_not_bend_the_curve(tmp_path):
     """Of two ramps the first began before the pump: the flow of its way up is brought to the usual pressure drop.
 

@@ -241,11 +241,6 @@ class TestPressureOnItsWay:
         with wording.refusal(InputError):
             identify(tests)
 
-    def test_a_branch_that_nobody_recorded_is_another_matter(self):
-        one = synthetic_ramp(1.0, Truth(), falling=False)
-        with pytest.raises(InputError, match="record every pressure drop up and down"):
-            identify([one, synthetic_ramp(4.0, Truth(slope=8.0))])
-
 
 class TestPumpOffAtTheStart:
     """A long rest without pressure before the ramp: signs are judged where oil flows."""

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import norm
 
 from dzdesign.identify.knees.characteristic import _with_censored
 from dzdesign.identify.knees.gated_line import fit_line
@@ -49,14 +48,6 @@ def test_the_line_of_a_tail_is_the_one_of_all_its_samples(floor):
     assert slope == pytest.approx(2.0, abs=0.15) and zero == pytest.approx(5.0, abs=0.03)
     if floor:
         assert abs(fit_line(u[seen], y[seen])[1] - 5.0) > 0.06
-
-
-def test_a_sample_is_filled_in_with_its_mean_below_the_floor():
-    u, y = np.array([1.0, 2.0, 3.0]), np.array([1.0, 2.0, 3.0])  # so exactly a line that one sample does not move it
-    u_all, y_all = _with_censored(np.repeat(u, 100_000), np.repeat(y, 100_000), np.array([1.2]), 1.0, 0.5)
-    z = (1.0 - 1.2) / 0.5
-    assert u_all[-1] == 1.2
-    assert y_all[-1] == pytest.approx(1.2 - 0.5 * norm.pdf(z) / norm.cdf(z), rel=1e-5)
 
 
 def test_a_drop_out_far_above_the_floor_is_not_filled_in():

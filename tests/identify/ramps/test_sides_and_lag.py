@@ -8,13 +8,11 @@ import numpy as np
 import pytest
 
 from dzdesign.command_line.cli import main
-from dzdesign.core.artefact_reading import read_artefact
-from dzdesign.core.artefact_types import as_document, to_json_bytes
+from dzdesign.core.artefact_types import as_document
 from dzdesign.core.errors import InputError
 from dzdesign.design.designing import design
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_files import ramp_file_bytes
-from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.recorded_drop import DropColumns, RecordedDrop
 from tests.support.repeatable_valves import identify
 from tests.support.synthetic import L_MIN, MPA, Truth, synthetic_ramp
@@ -110,10 +108,6 @@ class TestSides:
         (warning,) = [warning for warning in found.warnings if warning.code == "side-refused"]
         wording.of_test(warning.text)
 
-    def test_the_file_holds_both_sides(self, valve):
-        read = read_artefact(to_json_bytes(valve), ValveModel, "valve.json")
-        assert read == valve
-
     @pytest.mark.slow
     def test_the_command_prints_both(self, recordings, tmp_path, monkeypatch, capsys):
         monkeypatch.chdir(tmp_path)
@@ -168,11 +162,6 @@ class TestLag:
         wording.of_test(warning.text)
         hysteresis = [test.u_knee_rising_V - test.u_knee_falling_V for test in valve.positive.tests]
         assert np.mean(hysteresis) == pytest.approx(0.1 + 2 * 0.1 * 0.1, abs=5e-3)
-
-    def test_a_declared_lag_is_taken_as_it_is(self):
-        valve = identify(two_rates(0.1), IdentifyOptions(meter_lag=0.02))
-        assert (valve.meter.lag_is, valve.meter.lag_s) == ("declared", 0.02)
-        assert "lag-unknown" not in {warning.code for warning in valve.warnings}
 
 
 def codes(valve):

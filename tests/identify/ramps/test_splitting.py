@@ -13,7 +13,6 @@ from dzdesign.core.artefact_types import as_document, to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.splitting import nominal_dp, split_ramps
-from dzdesign.identify.reading.ramp_files import ramp_file_bytes, read_ramp_file
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.model import ValveModel
 from tests.support.repeatable_valves import identify
@@ -82,15 +81,6 @@ class TestLaws:
         assert_same_within_error(whole, [*halves, whole[1]], 0.3)
 
     @laws
-    @given(seed=seeds)
-    def test_a_repeated_test(self, seed):
-        once, twice = [ramp(1.0, seed)], [ramp(1.0, seed), ramp(1.0, seed + 1)]
-        (before,), (after,) = thresholds(once)[0], thresholds(twice)[0]
-        # Half of the data are the same; so is half of the error.
-        assert abs(after.u_knee_rising_V - before.u_knee_rising_V) < 2.5 * before.u_knee_se_V
-        assert abs(after.u_knee_rising_V - 5.44) < 4.5 * after.u_knee_se_V
-
-    @laws
     @given(seed=seeds, share=st.floats(0.1, 3.0))
     def test_more_samples_inside_the_dead_zone(self, seed, share):
         test = ramp(1.0, seed)
@@ -106,24 +96,6 @@ class TestLaws:
             dp=np.concatenate([np.full(n, test.dp[0]), test.dp]),
         )
         assert_same_within_error([test], [longer])
-
-    @laws
-    @given(
-        seed=seeds,
-        units=st.sampled_from([("s", "V", "MPa", "Lmin"), ("ms", "mV", "bar", "m3/h"), ("min", "V", "psi", "mL/min")]),
-    )
-    def test_the_unit_of_a_column_does_not_matter(self, seed, units, tmp_path):
-        from dzdesign.core.units import si_factor
-
-        test = ramp(1.0, seed)
-        kinds = ("time", "voltage", "pressure", "flow")
-        names = ("time", "u", "dP", "Q")
-        arrays = (test.time, test.u, test.dp, test.q)
-        lines = [",".join(f"{name} [{unit}]" for name, unit in zip(names, units, strict=True))]
-        scaled = [array / si_factor(unit, kind) for array, unit, kind in zip(arrays, units, kinds, strict=True)]
-        lines += [",".join(f"{value:.12g}" for value in row) for row in zip(*scaled, strict=True)]
-        (tmp_path / "ramp.csv").write_text("\n".join(lines))
-        assert_same_within_error([test], [read_ramp_file(tmp_path / "ramp.csv")], 1e-4)
 
 
 class TestSplitting:
@@ -143,11 +115,6 @@ class TestSplitting:
         assert [file.source for file in valve.made_from] == ["all.csv", "b.csv"]
         text = to_json_bytes(valve).decode()
         assert to_json_bytes(read_artefact(text.encode(), ValveModel, "valve.json")).decode() == text
-
-    def test_repeating_shrinks_the_error(self):
-        once = thresholds([ramp(1.0, 1)])[0][0].u_knee_se_V
-        many = thresholds([one_after_another(*(ramp(1.0, seed) for seed in range(9)))])[0][0].u_knee_se_V
-        assert many == pytest.approx(once / 3, rel=0.4)
 
     def test_the_cut_in_a_hold_is_where_the_pressure_steps(self):
         recording = one_after_another(ramp(1.0), ramp(2.0), ramp(3.0), hold_s=20)
@@ -195,13 +162,6 @@ class TestSplitting:
         tests, found = thresholds([late], IdentifyOptions(meter_lag=0.5))
         known = np.array([[5.5 - 0.06 * test.dp_MPa, 5.4 - 0.06 * test.dp_MPa] for test in tests])
         np.testing.assert_allclose(found, known, atol=0.01)
-
-    def test_written_recording_reads_back_as_many_tests(self, tmp_path):
-        recording = one_after_another(ramp(1.0, 1), ramp(2.0, 2))
-        arrays = (recording.time, recording.u, recording.dp / MPA, recording.q * 6e4)
-        columns = dict(zip(("time_s", "u_V", "dP_MPa", "Q_Lmin"), arrays, strict=True))
-        (tmp_path / "all.csv").write_bytes(ramp_file_bytes(columns, (), compress=False))
-        assert len(identify([read_ramp_file(tmp_path / "all.csv")]).positive.tests) == 2
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.005])

@@ -6,7 +6,6 @@ import logging
 import numpy as np
 import pytest
 
-from dzdesign.core.errors import InputError
 from dzdesign.identify.reading.columns import propose_columns
 from dzdesign.identify.reading.ramp_files import read_ramp_file
 from dzdesign.identify.reading.series import runs_back
@@ -76,11 +75,6 @@ def test_a_label_of_the_file_goes_before_a_pair(read):
     )
     np.testing.assert_allclose(read(content).time, TIME, atol=6e-4)
     assert not np.any(read(content, {"time": "Uhrzeit"}).time)
-
-
-def test_a_pair_is_one_of_dates_and_one_of_times_of_day(read):
-    with pytest.raises(InputError, match=r"has no column 'Uhrzeit [+] u \[V\]', which --columns names for time"):
-        read(two_columns(), {"time": "Uhrzeit + u [V]"})
 
 
 def test_of_two_columns_of_dates_none_is_taken_but_the_declared_one(proposed, read):

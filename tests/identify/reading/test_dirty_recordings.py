@@ -8,7 +8,7 @@ import pytest
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.command import lagged_command
 from dzdesign.identify.reading.ramp_files import ramp_file_bytes, read_ramp_file
-from dzdesign.identify.reading.ramp_test import RampTest, despiked
+from dzdesign.identify.reading.ramp_test import RampTest
 from tests.support.repeatable_valves import identify
 from tests.support.synthetic import L_MIN, Truth, synthetic_ramp
 
@@ -190,8 +190,3 @@ def test_blank_cells_and_a_clock_that_jitters_back(written):
     assert np.all(np.diff(read.time) >= 0) and read.u.size < test.u.size
     (found,) = identify([read], IdentifyOptions(meter_lag=0.001)).positive.tests
     assert (found.u_knee_rising_V, found.u_knee_falling_V) == pytest.approx(KNEES, abs=0.012)
-
-
-def test_despiking_keeps_steps_and_turning_points():
-    u = np.array([0.0, 0, 0, 9, 0, 0, 5, 5, 5, 6, 7, 6, 5, 5])
-    np.testing.assert_array_equal(despiked(u), [0, 0, 0, 0, 0, 0, 5, 5, 5, 6, 6, 6, 5, 5])

@@ -97,12 +97,13 @@ MARKERS = (
 )  # fmt: skip
 OVERLOADS = (
     "OL", "-OL", "O.L", "OVER", "+OVER", "- OVER", "Overload", "over range", "Überlauf", "HI", "LO", "+++++", "∞",
-    "Inf", "-Infinity", "1.#INF", "9.9E+37", "-9.90E+37", "3.4028235E+38", "1E+300", "32767", "-32768",
+    "Inf", "-Infinity", "1.#INF", "9.9E+37", "-9.90E+37", "3.4E+38", "3.4028235E+38", "1E+300", "32767", "-32768",
 )  # fmt: skip
 
 
 @pytest.mark.parametrize(
-    ("text", "kind"), [*((each, "marker") for each in MARKERS), *((each, "overload") for each in OVERLOADS)]
+    ("text", "kind"),
+    [*((each, "marker") for each in MARKERS), *((each, "overload") for each in OVERLOADS), ("9.91e37", "number")],
 )
 def test_texts_of_no_value_are_counted_by_column(tmp_path, text, kind):
     (tmp_path / "ramp.csv").write_text(with_texts(text))

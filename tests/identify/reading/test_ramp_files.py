@@ -64,67 +64,55 @@ def assert_is_the_ramp(test, rows=slice(None)):
     np.testing.assert_allclose(test.q, L_MIN * Q[rows], rtol=1e-5, atol=1e-15)
 
 
-@pytest.mark.parametrize("separator", [";", "\t"])
-def test_decimal_comma(read, separator):
-    assert_is_the_ramp(read(table(HEADER.replace(",", separator), separator=separator, comma=True)))
+def of_unit(label, column, factor):
+    """Return the ramp with one column in another unit."""
+    columns = [TIME, U, DP, Q]
+    columns[column] = factor * columns[column]
+    labels = HEADER.split(",")
+    labels[column] = label
+    return table(",".join(labels), columns)
 
 
-@pytest.mark.parametrize(
-    "header",
-    [
-        "time [s],u [V],dP [MPa],Q [L/min]",
-        "t (s),u (V),dP (MPa),Q (l/min)",
-        "t_s,U_V,dp_MPa,q_Lmin",
-        "Time[s],Command[V],Delta p[MPa],Flow[lpm]",
-        "time_s,u_V,Δp_MPa,Q_l_min",
-        "time_s , u_V , dP_MPa , Q_LPM",
-    ],
-)
-def test_spellings_of_labels(read, header):
-    assert_is_the_ramp(read(table(header)))
+def in_quotes():
+    return re.sub(r"[^,\n]+", lambda cell: f'"{cell[0]}"', table())
 
 
-@pytest.mark.parametrize(
-    ("label", "column"),
-    [
-        ("dP_bar", 10 * DP),
-        ("dP [kPa]", 1000 * DP),
-        ("dP (psi)", DP * 145.03773773),
-        ("dP [N/mm2]", DP),
-        ("dP [Pa]", DP * 1e6),
-    ],
-)
-def test_units_of_pressure(read, label, column):
-    assert_is_the_ramp(read(table(f"time_s,u_V,{label},Q_Lmin", (TIME, U, column, Q))))
+#: The same recording, written in many ways.
+READ = {
+    **{f"commas and {separator!r}": table(HEADER.replace(",", separator), separator=separator, comma=True)
+       for separator in ";\t"},
+    **{f"lines that end in {end!r}": table(end=end) for end in ("\n", "\r\n", "\r")},
+    **{header: table(header) for header in (
+        "time [s],u [V],dP [MPa],Q [L/min]", "t (s),u (V),dP (MPa),Q (l/min)", "t_s,U_V,dp_MPa,q_Lmin",
+        "Time[s],Command[V],Delta p[MPa],Flow[lpm]", "time_s,u_V,Δp_MPa,Q_l_min", "time_s , u_V , dP_MPa , Q_LPM",
+    )},
+    **{label: of_unit(label, column, factor) for label, column, factor in (
+        ("time_ms", 0, 1e3), ("time [min]", 0, 1 / 60), ("u_mV", 1, 1e3),
+        ("u [%]", 1, 10), ("u [pct]", 1, 10), ("u [percent]", 1, 10),
+        ("dP_bar", 2, 10), ("dP [kPa]", 2, 1e3), ("dP (psi)", 2, 145.03773773), ("dP [N/mm2]", 2, 1),
+        ("dP [Pa]", 2, 1e6),
+        ("Q [m3/s]", 3, L_MIN), ("Q [m³/h]", 3, 0.06), ("Q [cm3/s]", 3, 1000 / 60), ("Q [gpm]", 3, 1 / 3.785411784),
+        ("Q_mL/min", 3, 1e3),
+    )},
+    "both ports": table("time_s,u_V,pA_bar,pB_MPa,Q_Lmin", (TIME, U, 10 * (DP + 1), DP * 0 + 1, Q)),
+    "quotes": in_quotes(),
+    "quotes and blanks": in_quotes().replace(",", ", "),
+    "quoted commas": "\n".join([HEADER, *(
+        ",".join(f'"{value:.6g}"'.replace(".", ",") for value in row) for row in zip(TIME, U, DP, Q, strict=True))]),
+    "other columns": "\n".join(["sample,time_s,oil temperature,u_V,dP_MPa,note,Q_Lmin,,", *(
+        f"{row},{TIME[row]},40.1,{U[row]},{DP[row]},ok,{Q[row]},," for row in range(ROWS))]),
+    "T and Q_set behind": table(f"{HEADER},T_degC,Q_set", (TIME, U, DP, Q, 0 * Q + 40, 0 * Q + 7)),
+    "T before, Q_set behind": table(f"T_degC,{HEADER},Q_set", (0 * Q + 40, TIME, U, DP, Q, 0 * Q + 7)),
+}  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("label", "factor"),
-    [
-        ("Q [m3/s]", L_MIN),
-        ("Q [m³/h]", 0.06),
-        ("Q [cm3/s]", 1000 / 60),
-        ("Q [gpm]", 1 / 3.785411784),
-        ("Q_mL/min", 1e3),
-    ],
-)
-def test_units_of_flow(read, label, factor):
-    assert_is_the_ramp(read(table(f"time_s,u_V,dP_MPa,{label}", (TIME, U, DP, factor * Q))))
+@pytest.mark.parametrize("name", READ)
+def test_it_is_read_as_it_is(read, name):
+    assert_is_the_ramp(read(READ[name]))
 
 
-def test_units_of_time_and_command(read):
-    assert_is_the_ramp(read(table("time_ms,u_mV,dP_MPa,Q_Lmin", (1000 * TIME, 1000 * U, DP, Q))))
-
-
-@pytest.mark.parametrize("unit", ["%", "pct", "percent"])
-def test_command_in_per_cent_of_full_command(read, unit):
-    assert_is_the_ramp(read(table(f"time_s,u [{unit}],dP_MPa,Q_Lmin", (TIME, 10 * U, DP, Q))))
-    halved = read(table(f"time_s,u [{unit}],dP_MPa,Q_Lmin", (TIME, 10 * U, DP, Q)), u_max=5.0)
-    np.testing.assert_allclose(halved.u, U / 2, rtol=1e-5)
-
-
-def test_pressures_of_both_ports_stand_for_their_difference(read):
-    assert_is_the_ramp(read(table("time_s,u_V,pA_bar,pB_MPa,Q_Lmin", (TIME, U, 10 * (DP + 1), DP * 0 + 1, Q))))
+def test_per_cent_are_of_full_command(read):
+    np.testing.assert_allclose(read(READ["u [%]"], u_max=5.0).u, U / 2, rtol=1e-5)
 
 
 def test_a_file_without_pressure_has_none(read):
@@ -140,11 +128,6 @@ def test_comments_and_blank_lines_anywhere(read):
     assert_is_the_ramp(read(text))
 
 
-@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
-def test_ends_of_lines(read, end):
-    assert_is_the_ramp(read(table(end=end)))
-
-
 @pytest.mark.parametrize("before", ["", "# bench 3\n\n"])
 @pytest.mark.parametrize(
     "spoil", [lambda text: text, lambda text: text.replace(",1,", ",,", 1), lambda text: text[:-1]]
@@ -156,17 +139,6 @@ def test_plain_rows_are_read_as_rows_with_a_comment_are(read, spoil, before):
         np.testing.assert_array_equal(getattr(plain, name), getattr(commented, name))
 
 
-def test_quoted_cells(read):
-    quoted = re.sub(r"[^,\n]+", lambda cell: f'"{cell[0]}"', table())
-    assert_is_the_ramp(read(quoted))
-    assert_is_the_ramp(read(quoted.replace(",", ", ")))
-
-
-def test_quoted_decimal_commas_between_commas(read):
-    rows = [",".join(f'"{value:.6g}"'.replace(".", ",") for value in row) for row in zip(TIME, U, DP, Q, strict=True)]
-    assert_is_the_ramp(read("\n".join([HEADER, *rows])))
-
-
 @pytest.mark.parametrize("blank", ["", "  ", "nan", "NaN", '""'])
 def test_blank_cells_are_missing_samples(read, blank):
     lines = table().splitlines()
@@ -176,12 +148,6 @@ def test_blank_cells_are_missing_samples(read, blank):
         lines[row] = ",".join(cells)
     kept = [row for row in range(ROWS) if row + 1 not in (3, 7, 8)]
     assert_is_the_ramp(read("\n".join(lines)), kept)
-
-
-def test_columns_of_no_ramp_test_are_left_aside(read):
-    header = "sample,time_s,oil temperature,u_V,dP_MPa,note,Q_Lmin,,"
-    rows = [f"{n},{TIME[n]},40.1,{U[n]},{DP[n]},ok,{Q[n]},," for n in range(ROWS)]
-    assert_is_the_ramp(read("\n".join([header, *rows])))
 
 
 @pytest.mark.parametrize("compress", [False, True])
@@ -239,17 +205,3 @@ def test_gzip_with_a_changed_byte_is_refused(refusal):
         changed = content.copy()
         changed[place] ^= 0x10
         assert "gzip" in refusal(bytes(changed))
-
-
-@pytest.mark.parametrize("header", ["t_s,u_V,dP_MPa,Q_Lmin,T_degC,Q_set", "T_degC,t_s,u_V,dP_MPa,Q_Lmin,Q_set"])
-def test_a_column_of_another_kind_with_the_same_letter_is_left_alone(header, tmp_path):
-    names = header.split(",")
-    rows = []
-    for index in range(60):
-        value = {"t_s": index, "u_V": index / 6, "dP_MPa": 1, "Q_Lmin": index, "T_degC": 40, "Q_set": 7}
-        rows.append(",".join(str(value[name]) for name in names))
-    path = tmp_path / "ramp.csv"
-    path.write_text("\n".join([header, *rows]) + "\n")
-    test = read_ramp_file(path)
-    assert test.time[-1] == 59
-    assert test.q[-1] * 60000 == pytest.approx(59)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.dzdesign.batch.test_working_folder import is_there
 from tests.identify.reading.test_file_formats import GOOD
 
 #: What the reader, and what starts it, import.
@@ -41,7 +42,7 @@ def test_a_busy_reader_ends_with_the_process_that_asks_it_and_nothing_is_said(tm
     asking.wait(timeout=30)
     asking.stdout.close()
     end = time.monotonic() + SOON_S
-    while (there := _is_there(reader)) and time.monotonic() < end:
+    while (there := is_there(reader)) and time.monotonic() < end:
         time.sleep(0.05)
     if there:
         os.kill(reader, signal.SIGKILL)
@@ -61,12 +62,3 @@ def test_no_module_of_the_working_folder_is_imported(tmp_path, name):
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False)
     assert not mark.exists(), mark.read_text()
     assert done.returncode == 0 and "dP_MPa" in done.stdout, done.stderr
-
-
-def _is_there(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    stat = Path(f"/proc/{process}/stat")  # a zombie has ended
-    return not (stat.is_file() and stat.read_text().rpartition(")")[2].split()[0] == "Z")

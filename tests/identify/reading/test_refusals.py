@@ -12,11 +12,10 @@ import pytest
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.reading.ramp_files import read_ramp_file
+from tests.identify.reading import test_channel_clocks as clocks
 from tests.identify.reading.logger_files import DP, TIME, Q, U, rows, text
-from tests.identify.reading.test_channel_clocks import LATE, NAMELESS, clock, mat, side_by_side, tdms
-from tests.identify.reading.test_file_formats import COLUMNS, PLAIN, frame, hdf5
-from tests.identify.reading.test_file_formats import mat as mat_of
-from tests.identify.reading.test_file_formats import tdms as tdms_of
+from tests.identify.reading.test_date_and_time import two_columns
+from tests.identify.reading.test_file_formats import COLUMNS, PLAIN, frame, hdf5, mat, tdms, with_a_table
 from tests.identify.reading.test_ramp_files import HEADER, spoiled, table, zipped
 
 LABELS = "t_s;u_V;dP_MPa;Q_Lmin"
@@ -93,6 +92,26 @@ def plain(content, **keywords):
     return content, keywords
 
 
+def of_two_solenoids():
+    """Return a recording with a command for each solenoid, of which the first ends before the others."""
+    whole = [f"{line},0" for line in clocks.csv().decode().splitlines()]
+    return "\n".join([whole[0].replace("u_V", "uA_V")[:-1] + "uB_V", *whole[1:-9], *(line[:-1] for line in whole[-9:])])
+
+
+def with_segments(of_another_clock=False):
+    """Return a LabVIEW file whose second segment begins at the first one's time, or has another column."""
+    if not of_another_clock:
+        before, _, last = clocks.labview(segments=2).rpartition(b"AI3")
+        return before + b"AI9" + last
+    lines = clocks.labview(segments=2, runs_on=False).split(b"\r\n")
+    return b"\r\n".join(b"Time" + 3 * b"\t08:00:00,0" if line.startswith(b"Time") else line for line in lines)
+
+
+IN_LABVIEW = {"u": "AO0", "dP": "AI7", "Q": "AI3"}
+#: Of a maker, the label of the time of another channel than the command.
+TIMES_OF_Q = {"mat names": "t_Q_s", "csv equal labels": "Time (s)#3", "tdms": "time of Q", "hdf5 groups": "Q/time_s"}
+
+
 #: Name -> content and keywords; the place that the sentence names.
 REFUSED = {
     # what is no text
@@ -143,6 +162,14 @@ REFUSED = {
     "a flow in mA": (a_current(""), "column 'F (mA)'"),
     "a signal without a meaning": (a_current("4..20 mA"), "column 'F (mA)'"),
     "a flow in bar": (a_current("4..20 mA = 0..50 bar"), "column 'F (mA)'"),
+    "a range in V of mV": (
+        plain(text("t_s,u_V,dP_MPa,Q_mV", *rows(TIME, U, DP, 200 * Q, separator=",", comma=False)),
+              columns={"Q": "Q_mV:0..10 V = 0..50 L/min"}), "column 'Q_mV'",
+    ),
+    "a range in us of ms": (
+        plain(text("t_s,pulse_ms,dP_MPa,Q_Lmin", *rows(TIME, 1.5 + 0.04 * U, DP, Q, separator=",", comma=False)),
+              columns={"u": "pulse_ms:1500..1900 us = 0..10 V"}), "column 'pulse_ms'",
+    ),
     "a range in s": (a_current("4..20 s = 0..50 L/min"), "column 'F (mA)'"),
     "a range in ma": (a_current("4..20 ma = 0..50 L/min"), "column 'F (mA)'"),
     "a range without width": (a_current("4..4 mA = 0..50 L/min"), "column 'F (mA)'"),
@@ -203,6 +230,7 @@ REFUSED = {
     "a day or a month, in its own column": (
         plain(two_dates("01/02/2026", "02/02/2026"), columns={"time": "Datum + Uhrzeit"}), "column 'Datum + Uhrzeit'",
     ),
+    "a pair that is none": (plain(two_columns(), columns={"time": "Uhrzeit + u [V]"}), "'Uhrzeit + u [V]'"),
     "a word for a date": (
         plain(two_dates("22.11.2026", "soon"), columns={"time": "Datum + Uhrzeit"}), "row 302, column 'Datum +",
     ),
@@ -213,17 +241,33 @@ REFUSED = {
     "the end of summer time, without dates": (plain(set_back(1, "%H:%M:%S,")), "row"),
     "a clock of 12 hours": (plain(set_back(12, "%I:%M:%S,")), "row"),
     # clocks of channels
-    "starts stated for some": (plain(tdms(LATE, stated=("u", "dP"))), "'Q'"),
-    "no time in common": (plain(mat({**LATE, "Q": clock() + 1e4})), "'Q_Lmin'"),
-    "clocks in other units": (plain(mat(LATE).replace(b"t_Q_s", b"t_Q_h")), "'Q_Lmin'"),
-    "clocks without units": (plain(mat(LATE, "t_{}")), "column"),
+    "starts stated for some": (plain(clocks.tdms(clocks.LATE, stated=("u", "dP"))), "'Q'"),
+    "no time in common": (plain(clocks.mat({**clocks.LATE, "Q": clocks.clock() + 1e4})), "'Q_Lmin'"),
+    "clocks in other units": (plain(clocks.mat(clocks.LATE).replace(b"t_Q_s", b"t_Q_h")), "'Q_Lmin'"),
+    "clocks without units": (plain(clocks.mat(clocks.LATE, "t_{}")), "column"),
     "times behind, equal labels": (
-        plain(side_by_side(LATE, "Time (s)").replace(b"Time (s),u (V)", b"u (V),Time (s)", 1)), "'u (V)'",
+        plain(clocks.side_by_side(clocks.LATE, "Time (s)").replace(b"Time (s),u (V)", b"u (V),Time (s)", 1)), "'u (V)'",
     ),
-    "names that tell nothing": (plain(NAMELESS), ""),
+    "names that tell nothing": (plain(clocks.NAMELESS), ""),
+    "names that tell nothing, one declared": (plain(clocks.NAMELESS, columns={"time": "t_x_s"}), "'Q_Lmin'"),
+    "a name that tells nothing": (plain(clocks.mat(clocks.EVEN).replace(b"t_Q_s", b"t_y_s")), "'Q_Lmin'"),
+    "a channel without a time": (plain(clocks.tdms(clocks.LATE, timeless="dP")), "'dP'"),
+    **{f"a sample rate, {maker}": (plain(clocks.MAKERS[maker](clocks.LATE), sample_rate=20.0), "--sample-rate")
+       for maker in TIMES_OF_Q},
+    "a sample rate, mat without units": (plain(clocks.mat(clocks.LATE, "t_{}"), sample_rate=20.0), "--sample-rate"),
+    **{f"the time of Q, {maker}": (plain(clocks.MAKERS[maker](clocks.LATE), columns={"time": label}), "of time of 'u")
+       for maker, label in TIMES_OF_Q.items()},
+    **{f"{name} ends {rows} rows early": (plain(clocks.csv(**{name: rows})), f"'{clocks.LABELS[name]}' ends at row")
+       for name, rows in (("Q", 7), ("Q", 280), ("u", 140), ("dP", 14), ("time", 9))},
+    "dP and Q end early": (plain(clocks.csv(dP=700, Q=700)), "'dP_MPa' ends at row"),
+    "a solenoid that ends early": (plain(of_two_solenoids(), columns={"u": "uA_V - uB_V"}), "'uA_V' ends at row"),
+    **{f"LabVIEW {columns}, no command": (plain(clocks.labview(columns)), "has no column of u")
+       for columns in ("One", "No", "Multi")},
+    "segments of one time": (plain(with_segments(of_another_clock=True), columns=IN_LABVIEW), "row"),
+    "segments of other columns": (plain(with_segments(), columns=IN_LABVIEW), "row"),
     # binary files
-    "no columns of numbers": (plain(mat_of({"note": "none"})), ""),
-    "unequal lengths": (plain(mat_of({**COLUMNS, "Q_Lmin": COLUMNS["Q_Lmin"][:-1]})), "column 'Q_Lmin'"),
+    "no columns of numbers": (plain(mat({"note": "none"})), ""),
+    "unequal lengths": (plain(mat({**COLUMNS, "Q_Lmin": COLUMNS["Q_Lmin"][:-1]})), "column 'Q_Lmin'"),
     "a flow of no valve": (
         plain(frame("write_parquet", {**COLUMNS, "Q_Lmin": COLUMNS["Q_Lmin"] * 1e9})), "sample 16, column 'Q_Lmin'",
     ),
@@ -232,11 +276,14 @@ REFUSED = {
         plain(frame("write_parquet", {"t" if name == "time_s" else name: data for name, data in COLUMNS.items()})),
         "column 't'",
     ),
-    "a unit of another quantity": (plain(tdms_of({**PLAIN, "u": (PLAIN["u"][0], "bar")})), "column 'u'"),
+    "a unit of another quantity": (plain(tdms({**PLAIN, "u": (PLAIN["u"][0], "bar")})), "column 'u'"),
     "one name in two groups": (
-        plain(mat_of({"a": {name: COLUMNS[name] for name in ("u_V", "time_s", "Q_Lmin")},
+        plain(mat({"a": {name: COLUMNS[name] for name in ("u_V", "time_s", "Q_Lmin")},
                       "b": {"u_V": COLUMNS["u_V"]}})), "a/u_V",
     ),
+    "two MATLAB tables": (plain(with_a_table({"x": TIME})), "table2struct"),
+    "a MATLAB table": (plain(with_a_table({"x": TIME}, ["T"])), "table2struct"),
+    "MATLAB tables beside a text": (plain(with_a_table({"note": "a"})), "table2struct"),
     "two commands": (plain(hdf5({**COLUMNS, "u [V]": COLUMNS["u_V"]})), "'u_V'"),
     "text for a command": (
         plain(frame("write_parquet", {**COLUMNS, "note": ["ok"] * 30}), columns={"u": "note:V"}), "column 'note'",

@@ -319,6 +319,10 @@ def data_sets(scatter: Scatter, grid_MPa: np.ndarray, criticals: Criticals) -> t
     return tuple(found)
 
 
+#: Fewest standard deviations that are looked for.
+LEAST_CRITICAL = 1e-3
+
+
 def critical(weights: np.ndarray, degrees: float, share: float, tail: float) -> float:
     """Return the standard deviations that the largest error of these sums exceeds with that probability.
 
@@ -338,7 +342,12 @@ def _critical(weights: bytes, shape: tuple[int, int], degrees: float, share: flo
     if not np.isfinite(degrees):
         return float(np.quantile(largest, 1 - tail))
     largest = np.maximum(np.sort(largest).reshape(-1, TOGETHER).mean(axis=1), 0.0)
-    return float(brentq(lambda c: np.mean(chdtr(degrees, degrees * (largest / c) ** 2)) - tail, 1.0, 1e4, xtol=1e-4))
+
+    def beyond(deviations: float) -> float:
+        return float(np.mean(chdtr(degrees, degrees * (largest / deviations) ** 2)) - tail)
+
+    # At a low confidence less than one standard deviation is enough; at the lowest none is.
+    return LEAST_CRITICAL if beyond(LEAST_CRITICAL) <= 0 else float(brentq(beyond, LEAST_CRITICAL, 1e4, xtol=1e-4))
 
 
 @lru_cache(maxsize=8)
