@@ -96,6 +96,8 @@ IMPOSSIBLE = [
     ("f280049c", "PWM=9", "PWM must be 1 to 8"),
     ("f280049c", "WINDOW=4", "WINDOW"),
     ("f280049c", "PRESSURE_A=2", "same channel"),
+    ("f280049c", "TRIP_GPIO=24", "boot pins"),
+    ("f280049c", "TRIP_GPIO=0", "pin of the PWM"),
 ]
 
 

@@ -174,3 +174,36 @@ def test_a_board_file_with_more_than_values_is_code(text):
     whole = "#ifndef DZ_BOARD_H\n#define DZ_BOARD_H\n{}\n#endif\n"
     assert read_board_values(whole.format("/* none */")) == {}
     assert read_board_values(whole.format(text)) is None
+
+
+@needs_compiler
+@pytest.mark.slow
+@pytest.mark.parametrize("more", ["#define MY_LED_GPIO 34", "#define DZ_BOARD_LED A3"])
+def test_a_board_file_that_is_not_read_is_not_checked_and_its_line_is_named(folder_of, more):
+    """It would take every requirement of the device away, and with them the reason to believe in the folder."""
+    folder = folder_of("f280049c")
+    path = folder / "f280049c/dz_board.h"
+    path.write_text(path.read_text("utf-8").replace("#define DZ_BOARD_H\n", f"#define DZ_BOARD_H\n{more}\n"), "utf-8")
+    found = api.verify(folder)
+    (check,) = [each for each in found.evidence.checks if each.id == "hardware-compiles"]
+    assert not found.holds and check.holds is None and f"line 9, '{more}'" in check.text
+
+
+@needs_compiler
+def test_code_of_the_user_is_his_from_whatever_folder_he_calls(folder_of, monkeypatch):
+    folder = folder_of("f28335")
+    (folder / "board/dz_user.c").write_text("#error this is mine\n")
+    monkeypatch.chdir(folder)
+    assert "this is mine" in found_in(Path(), with_code=True)["hardware-compiles"]
+    (folder / "board/dz_user.c").write_text(
+        '#include "DSP28x_Project.h"\n#include "dz_user.h"\nvoid dz_user_init(void) {}\n'
+        "void dz_user_poll(void) { GpioDataRegs.GPBTOGGLE.bit.GPIO34 = 1; }\n"
+    )
+    assert found_in(Path(), with_code=True) == {}
+
+
+@needs_compiler
+def test_what_differs_from_the_declaration_is_said(folder_of):
+    folder = folder_of("f28335, declared")
+    change(folder, PRESSURE_A=0, PRESSURE_B=15)
+    assert re.search(r"; dz_board.h has PRESSURE_A 0, and declared is \w+;", found_in(folder)["hardware-channels"])

@@ -42,7 +42,7 @@ from dzdesign.verify.folder import (
     reproduced,
     user_files,
 )
-from dzdesign.verify.hardware.board_values import BOARD_FILE, board_of
+from dzdesign.verify.hardware.board_values import BOARD_FILE, beside_values, board_of, read_board_values
 from dzdesign.verify.hardware.checks import hardware_checks
 from dzdesign.verify.hardware.model import DEVICES, Bench
 from dzdesign.verify.requirements import EVERY_RUN, OF_SOME, Check, Requirement, Tried, checks_of
@@ -133,12 +133,22 @@ def _hardware(firmware: Firmware) -> Iterator[Check]:
     firmware.say("running the firmware on a model of its device")
     board = board_of(firmware.folder, firmware.code, firmware.manifest, with_code=firmware.asked.board_code)
     if board is None:
-        return  # said as what is not tried
+        name = f"{firmware.manifest.target}/{BOARD_FILE}"
+        there = (firmware.folder / name).read_text(encoding="utf-8", errors="replace")
+        if read_board_values(there) is not None:
+            return  # code of the user's keeps it from running: said as what is not tried
+        found = beside_values(there)
+        text = f"{name}, {found} is no value of the board; keep values alone there, and what is yours in board/"
+        yield requirements.HARDWARE_COMPILES.check(holds=None, text=text)
+        return
     firmware.board_ran = board.taken
+    checks = list(hardware_checks(lambda: Bench(firmware.code, firmware.manifest, firmware.compensator, board)))
+    yield from checks
     if board.code:
-        text = f"{', '.join(board.taken)}: compiled and run with what follows"
-        yield requirements.BOARD_CODE.check(holds=True, text=text)
-    yield from hardware_checks(lambda: Bench(firmware.code, firmware.manifest, firmware.compensator, board))
+        holds = all(check.holds for check in checks)
+        found = "all of the device holds with it" if holds else "see what does not hold of the device"
+        text = f"{', '.join(board.taken)}: {found}"
+        yield requirements.BOARD_CODE.check(holds=holds, text=text)
 
 
 def _every_input(firmware: Firmware) -> list[Check]:

@@ -5,10 +5,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from dzdesign.core.errors import quoted
 from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.verify.folder import changed_board_files, user_files
 
 BOARD_FILE = "dz_board.h"
+#: Characters of a line that are shown.
+SHOWN = 60
 
 COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL)
 VALUE = re.compile(
@@ -37,6 +40,23 @@ def read_board_values(text: str) -> Mapping[str, int] | None:
         for name, number in VALUE.findall(whole[1])
     ]
     return dict(found) if len(dict(found)) == len(found) else None
+
+
+def beside_values(text: str) -> str:
+    """Return the first line of a board's file that is more than a value, with its number.
+
+    Examples
+    --------
+    >>> beside_values("#ifndef DZ_BOARD_H\\n#define DZ_BOARD_H\\n#define LED 34\\n#endif\\n")
+    "line 3, '#define LED 34'"
+    """
+    plain = COMMENT.sub(lambda found: " " + "\n" * found[0].count("\n"), text.replace("\r\n", "\n"))
+    value = re.compile(VALUE.pattern.lstrip("\\s*"), re.ASCII)
+    plain = value.sub(lambda found: "\n" * found[0].count("\n"), plain)
+    for number, line in enumerate(plain.splitlines(), start=1):
+        if line.strip() and not re.fullmatch(r"\s*#(?:ifndef DZ_BOARD_\w+|define DZ_BOARD_H|endif)\s*", line):
+            return f"line {number}, {quoted(line.strip()[:SHOWN])}"
+    return "its first lines"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,6 +90,6 @@ def board_of(folder: Path, code: Path, manifest: FirmwareManifest, *, with_code:
     return Board(
         values=values,
         lacking=tuple(sorted(made.keys() - values.keys())),
-        code={code / name: folder / name for name in taken},
+        code={code / name: (folder / name).resolve() for name in taken},
         taken=(*([header] if header in changed else []), *taken),
     )

@@ -382,7 +382,7 @@ TRIED: tuple[tuple[Requirement, Callable[[HardwareRuns], str], str], ...] = (
     (requirements.HARDWARE_PWM, _switches, "{pins} at {tick_Hz} Hz; low at compare value 0, high throughout at {full}"),
     (requirements.HARDWARE_START, _starts_low, "{pins} low; also after a watchdog reset, and without the crystal"),
     (requirements.HARDWARE_CHANNELS, _reaches, "{sets} sets of codes on {names}: the exact duty in every PWM period"),
-    (requirements.HARDWARE_TRIP, _trips, f"low within {1e6 * TRIP_S:g} us, and until a reset"),
+    (requirements.HARDWARE_TRIP, _trips, f"low within {1e6 * TRIP_S:g} us of GPIO{{trip}}, and until a reset"),
     (requirements.HARDWARE_SAMPLE_LOSS, _loses_samples, f"low within {1e3 * SAMPLE_LOSS_S:g} ms, and until a reset"),
     (requirements.HARDWARE_WATCHDOG, _watched, "within {watchdog_ms:.2f} ms, and not while the interrupt runs"),
     (requirements.HARDWARE_RATES, _at_its_rate, "interrupts at {tick_Hz} Hz, samples at {sample_Hz} Hz"),
@@ -404,7 +404,7 @@ def hardware_checks(make: Callable[[], Bench]) -> Iterator[Check]:
         "pins": " and ".join(f"GPIO{gpio}" for gpio in bench.pins), "tick_Hz": signals.tick_Hz,
         "sample_Hz": signals.sample_Hz, "full": signals.compare_max, "sets": len(runs.followed),
         "names": ", ".join(bench.names[role] for role in INPUTS), "watchdog_ms": 1e3 * bench.watchdog_s,
-        "parts": runs.drive.sampling.samples if runs.drive else 0,
+        "trip": bench.board["TRIP_GPIO"], "parts": runs.drive.sampling.samples if runs.drive else 0,
     }  # fmt: skip
     applies = {requirements.HARDWARE_SOLENOIDS: bench.two, requirements.HARDWARE_CURRENT: runs.drive is not None}
     for requirement, tried, found in TRIED:
@@ -413,4 +413,5 @@ def hardware_checks(make: Callable[[], Bench]) -> Iterator[Check]:
                 fault = tried(runs)
             except RequirementError as error:
                 fault = str(error)
-            yield requirement.check(holds=not fault, text=fault or found.format(**figures))
+            said = f"{fault}{bench.undeclared}" if fault else found.format(**figures)
+            yield requirement.check(holds=not fault, text=said)

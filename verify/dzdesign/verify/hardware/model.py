@@ -178,6 +178,19 @@ class Bench:
         return [self.board["PWM_GPIO"], *([self.board["PWM_B_GPIO"]] if self.two else [])]
 
     @property
+    def undeclared(self) -> str:
+        """In what the board's file is not what was declared to `design`, as the end of a sentence."""
+        board, declared = {role: self.board.get(role) for role in self.channels}, self.channels
+        said = [
+            f"{role} {self.board[role]}, and declared is {self.names[role]}"
+            for role in declared
+            if board[role] not in (None, declared[role])
+        ]
+        if self.board.get("OSC_HZ", self.crystal_Hz) != self.crystal_Hz:
+            said.append(f"OSC_HZ {self.board['OSC_HZ']}, and declared are {self.crystal_Hz} Hz")
+        return f"; dz_board.h has {'; '.join(said)}" if said else ""
+
+    @property
     def watchdog_s(self) -> float:
         """Time after which the watchdog of this board resets."""
         setting = self.board[self.device.prescale]

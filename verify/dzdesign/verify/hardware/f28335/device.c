@@ -267,9 +267,10 @@ void settle_registers(void)
     }
     settle_converter();
     counters_run = SysCtrlRegs.PCLKCR0.bit.TBCLKSYNC == 1u;
-    GpioDataRegs.GPADAT.all = (a | GpioDataRegs.GPASET.all) & ~GpioDataRegs.GPACLEAR.all;
-    GpioDataRegs.GPBDAT.all = (b | GpioDataRegs.GPBSET.all) & ~GpioDataRegs.GPBCLEAR.all;
-    GpioDataRegs.GPASET.all = GpioDataRegs.GPACLEAR.all = GpioDataRegs.GPBSET.all = GpioDataRegs.GPBCLEAR.all = 0u;
+    GpioDataRegs.GPADAT.all = ((a | GpioDataRegs.GPASET.all) & ~GpioDataRegs.GPACLEAR.all) ^ GpioDataRegs.GPATOGGLE.all;
+    GpioDataRegs.GPBDAT.all = ((b | GpioDataRegs.GPBSET.all) & ~GpioDataRegs.GPBCLEAR.all) ^ GpioDataRegs.GPBTOGGLE.all;
+    GpioDataRegs.GPASET.all = GpioDataRegs.GPACLEAR.all = GpioDataRegs.GPATOGGLE.all = 0u;
+    GpioDataRegs.GPBSET.all = GpioDataRegs.GPBCLEAR.all = GpioDataRegs.GPBTOGGLE.all = 0u;
     for (unsigned gpio = 0u; gpio < GPIOS; gpio++)
     {
         inputs[gpio / 32u] |= (level_of(gpio) == HIGH) ? UINT32_C(1) << (gpio % 32u) : 0u;
