@@ -28,6 +28,7 @@ from dzdesign.verify.compilation import board_compiles, check_include, compiles_
 from dzdesign.verify.current.current_checks import CurrentChecks, current_checks
 from dzdesign.verify.evidence import Evidence, InputCheck
 from dzdesign.verify.exhaustive.all_inputs import every_input, input_checks, lot_checked
+from dzdesign.verify.exhaustive.asked_functions import functions_asked_for
 from dzdesign.verify.exhaustive.block_check import own_block_accepted
 from dzdesign.verify.exhaustive.drive_check import drive_follows
 from dzdesign.verify.exhaustive.machine_code import machine_code_checks
@@ -219,6 +220,11 @@ REQUIREMENTS: tuple[Tried[Firmware], ...] = (
     Tried(requirements.OF_INPUTS, _every_input, lambda each: each.scenes is not None),
     Tried((requirements.LOT,), lambda each: lot_checked(each.inputs, each.compensator), Firmware.runs),
     Tried((requirements.DRIVE,), lambda each: [drive_follows(each.code, each.compensator)], Firmware.runs),
+    Tried(
+        (requirements.ASKED_FOR,),
+        lambda each: [functions_asked_for(each.compensator)],
+        lambda each: each.compensator.options is not None,
+    ),
     Tried(requirements.OF_CURRENT, _current, Firmware.runs),
     Tried(requirements.OF_LOOP, _closed_loop, Firmware.runs),
     Tried((requirements.BOARD_FILES,), _board, Firmware.is_as_generated),

@@ -313,16 +313,21 @@ def _loses_samples(runs: HardwareRuns) -> str:
 def _watched(runs: HardwareRuns) -> str:
     allowed_us = 1e6 * runs.bench.watchdog_s
     stop_us = max(2.3 * allowed_us, 10 * runs.period_us)
-    trace = runs.bench.run([*runs.at_rest(), Step(stop_us, "interrupts", 0)], stop_us + 2 * allowed_us + runs.period_us)
-    resets, stop = trace.times("reset"), trace.count_at(stop_us)
-    if not resets:
-        return f"no reset within {2 * allowed_us / 1000:.1f} ms after the interrupt stopped"
-    if resets[0] < stop:
-        return f"the watchdog resets {trace.ms_of(resets[0]):.1f} ms after the start, though the interrupt runs"
-    taken_us = 1e6 * (resets[0] - stop) / trace.clock_Hz
-    if taken_us > allowed_us * 1.001:
-        taken, stated = f"{taken_us / 1000:.1f} ms", f"{allowed_us / 1000:.1f} ms"
-        return f"the watchdog resets {taken} after the interrupt stopped, stated are {stated}"
+    for word, stopped, other in (
+        ("interrupts", "the interrupt", "the interrupt runs"),
+        ("turns", "the main loop", "the main loop turns"),
+    ):
+        end_us = stop_us + 2 * allowed_us + runs.period_us
+        trace = runs.bench.run([*runs.at_rest(), Step(stop_us, word, 0)], end_us)
+        resets, stop = trace.times("reset"), trace.count_at(stop_us)
+        if not resets:
+            return f"no reset within {2 * allowed_us / 1000:.1f} ms after {stopped} stopped"
+        if resets[0] < stop:
+            return f"the watchdog resets {trace.ms_of(resets[0]):.1f} ms after the start, though {other}"
+        taken_us = 1e6 * (resets[0] - stop) / trace.clock_Hz
+        if taken_us > allowed_us * 1.001:
+            taken, stated = f"{taken_us / 1000:.1f} ms", f"{allowed_us / 1000:.1f} ms"
+            return f"the watchdog resets {taken} after {stopped} stopped, stated are {stated}"
     return ""
 
 
@@ -384,7 +389,7 @@ TRIED: tuple[tuple[Requirement, Callable[[HardwareRuns], str], str], ...] = (
     (requirements.HARDWARE_CHANNELS, _reaches, "{sets} sets of codes on {names}: the exact duty in every PWM period"),
     (requirements.HARDWARE_TRIP, _trips, f"low within {1e6 * TRIP_S:g} us of GPIO{{trip}}, and until a reset"),
     (requirements.HARDWARE_SAMPLE_LOSS, _loses_samples, f"low within {1e3 * SAMPLE_LOSS_S:g} ms, and until a reset"),
-    (requirements.HARDWARE_WATCHDOG, _watched, "within {watchdog_ms:.2f} ms, and not while the interrupt runs"),
+    (requirements.HARDWARE_WATCHDOG, _watched, "within {watchdog_ms:.2f} ms, or the main loop; not before"),
     (requirements.HARDWARE_RATES, _at_its_rate, "interrupts at {tick_Hz} Hz, samples at {sample_Hz} Hz"),
     (requirements.HARDWARE_SOLENOIDS, _never_both, "{pins} are never high at once"),
     (requirements.HARDWARE_CURRENT, _samples_the_current, "{parts} codes in a PWM period, at the middles of its parts"),

@@ -207,6 +207,7 @@ class Bench:
         folders = [*dict.fromkeys(str(path.parent) for path in self._user.values()), *folders]
         flags = [*(["-std=gnu99", "-w"] if self._user else STRICT), *OPTIONS, *(f"-I{folder}" for folder in folders)]
         flags += [f"-DDZ_BOARD_{name}={value}" for name, value in self.board.items()]
+        flags += ["-DDEVICE_FROM_FLASH", "-D__interrupt="]  # a word of TI's compiler, which dz_isr.h has by itself
         flags += ["-DTWO_SOLENOIDS"] if self.two else []
         digest = sha256_of("\n".join([str(code), *map(str, units), *flags]).encode())[:16]
         made = build_folder() / f"hardware-{digest}"

@@ -19,6 +19,7 @@ volatile struct GPIO_DATA_REGS GpioDataRegs;
 volatile struct PIE_CTRL_REGS PieCtrlRegs;
 volatile struct PIE_VECT_TABLE PieVectTable;
 volatile unsigned int IER, IFR;
+#define ADCCLK_MOST_HZ 25e6 /* SPRS439 */
 Uint16 RamfuncsLoadStart, RamfuncsLoadEnd, RamfuncsRunStart;
 
 /* What EALLOW protects: a write outside EALLOW ... EDIS does not happen. */
@@ -34,7 +35,12 @@ struct protected_registers
 };
 
 static struct protected_registers kept;
-static bool unlocked, peripherals_clocked, pie_blocked;
+static bool unlocked, peripherals_clocked, pie_blocked, converter_too_fast;
+#ifdef DEVICE_FROM_FLASH
+static bool copied = false;
+#else
+static bool copied = true;
+#endif
 static double crystal_hz;
 static uint16_t wdcr_before;
 static unsigned sequencers[2]; /* where each goes on */
@@ -300,6 +306,7 @@ void start_conversions(unsigned module, enum trigger trigger)
     const unsigned last = (trigger == SOC_A) ? AdcRegs.ADCMAXCONV.bit.MAX_CONV1 : AdcRegs.ADCMAXCONV.bit.MAX_CONV2;
 
     (void)module; /* all modules' starts are one signal */
+    converter_too_fast = sysclk_hz / adcclk > ADCCLK_MOST_HZ;
     if ((listens == 0u) || ((trigger == SOC_B) && (cascaded != 0u)) || !peripherals_clocked || is_busy(group) ||
         !converter_hears(channel_of((trigger == SOC_A) ? sequencers[0] : 8u + sequencers[1])))
     {
@@ -319,8 +326,11 @@ void start_conversions(unsigned module, enum trigger trigger)
 
 void converted(const struct conversion *conversion)
 {
-    (&AdcMirror.ADCRESULT0)[conversion->slot] = conversion->code;
-    (&AdcRegs.ADCRESULT0)[conversion->slot] = (uint16_t)(conversion->code << 4);
+    /* A converter that is clocked faster than it bears gives nothing to rely on. */
+    const uint16_t code = converter_too_fast ? 0xFFFu : conversion->code;
+
+    (&AdcMirror.ADCRESULT0)[conversion->slot] = code;
+    (&AdcRegs.ADCRESULT0)[conversion->slot] = (uint16_t)(code << 4);
     if (conversion->last && (conversion->group == 0u))
     {
         AdcRegs.ADCST.bit.INT_SEQ1 = 1u;
@@ -331,10 +341,11 @@ void converted(const struct conversion *conversion)
     }
 }
 
-/* PIE group 3: until it is acknowledged no other interrupt of it comes. */
+/* PIE group 3: until it is acknowledged no other interrupt of it comes. An interrupt that was not copied to where it runs
+ * from, in the FLASH build, does nothing either. */
 bool interrupt_passes(unsigned module)
 {
-    return (((PieCtrlRegs.PIEIER3.all >> module) & 1u) != 0u) && ((IER & M_INT3) != 0u) && !pie_blocked &&
+    return (((PieCtrlRegs.PIEIER3.all >> module) & 1u) != 0u) && ((IER & M_INT3) != 0u) && !pie_blocked && copied &&
            ((&PieVectTable.EPWM1_INT)[module] != 0);
 }
 
@@ -415,5 +426,5 @@ void ServiceDog(void) { serve_watchdog(); }
 
 void MemCopy(Uint16 *source, Uint16 *source_end, Uint16 *destination)
 {
-    (void)source, (void)source_end, (void)destination;
+    copied = (source == &RamfuncsLoadStart) && (source_end == &RamfuncsLoadEnd) && (destination == &RamfuncsRunStart);
 }

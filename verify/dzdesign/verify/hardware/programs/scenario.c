@@ -36,7 +36,7 @@ void __cyg_profile_func_exit(void *function, void *caller);
 static struct step *steps;
 static unsigned step_count, step_at;
 static double started_s, end_s;
-static bool started, writes, interrupts_off, deaf[CHANNELS];
+static bool started, writes, interrupts_off, hangs, deaf[CHANNELS];
 static uint16_t codes[CHANNELS], compares[2];
 static unsigned coil_channel = CHANNELS, coil_gpio = GPIOS;
 static struct solenoid solenoid;
@@ -109,6 +109,10 @@ void act(void)
     {
         interrupts_off = one == 0u;
     }
+    else if (strcmp(step->word, "turns") == 0)
+    {
+        hangs = one == 0u;
+    }
     else if (strcmp(step->word, "compare") == 0)
     {
         writes = true;
@@ -150,13 +154,17 @@ void reset_by_watchdog(void)
 void __cyg_profile_func_enter(void *function, void *caller)
 {
     (void)function, (void)caller;
-    if (started)
+    while (started)
     {
         delay(TURN_S);
         if (seconds_now() > started_s + end_s)
         {
             happened("end", 0u, 0u);
             longjmp(out, 1);
+        }
+        if (!hangs)
+        {
+            return;
         }
     }
 }
