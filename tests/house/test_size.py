@@ -22,7 +22,7 @@ ROOM_SIZES = {
     "dzdesign": (8729, 59, 161),
 }
 #: Lines of Python of what is not shipped, and of the files that the tests compare with.
-TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 45082, 14441, 8531
+TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 45082, 14444, 8531
 #: Options of all commands together; an option of two commands counts twice.
 OPTIONS = 165
 #: What a number may be above what is there, before it is to be lowered.

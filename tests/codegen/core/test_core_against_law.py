@@ -177,7 +177,7 @@ def test_a_core_is_compiled_once_and_a_wrong_number_is_seen(tmp_path):
         {"offset": side.offset - side.offset // 1000},
         {"nodes": (*side.nodes[:20], side.nodes[20] + 300, *side.nodes[21:])},
         {"nodes": (*side.nodes[:-1], side.nodes[-1] + 3000)},
-        {"transition": side.transition - 1000},
+        {"transition": side.transition - side.transition // 1000},
         {"room": side.room // 2},
         {"quotient_limit": side.quotient_limit // 2},
         {"beta_factor": side.beta_factor - side.beta_factor // 1000},
