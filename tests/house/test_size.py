@@ -17,12 +17,12 @@ ROOM_SIZES = {
     "assess": (1577, 8, 0),
     "design": (6950, 31, 0),
     "codegen": (7522, 50, 7609),
-    "verify": (11147, 61, 4242),
+    "verify": (11147, 61, 4241),
     "report": (4416, 20, 532),
     "dzdesign": (8729, 59, 161),
 }
 #: Lines of Python of what is not shipped, and of the files that the tests compare with.
-TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 45082, 14444, 8531
+TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 45082, 14444, 8534
 #: Options of all commands together; an option of two commands counts twice.
 OPTIONS = 165
 #: What a number may be above what is there, before it is to be lowered.

@@ -16,7 +16,7 @@ struct start
     uint32_t trigger, channel, window;
 };
 
-static double codes_scale = 1.0;
+static bool other_reference; /* than 3.3 V, which the codes are of */
 static struct start starts[16];
 static uint16_t results[16];
 static uint32_t burst_trigger, burst_size, round_robin = CURRENT_SOC, flag_source[2], priority;
@@ -116,11 +116,10 @@ void ADC_setBurstModeConfig(uint32_t base, ADC_Trigger trigger, uint16_t size)
     burst_size = size;
 }
 void ADC_enableBurstMode(uint32_t base) { (void)base, burst = true; }
-/* Codes stand for the range of 3.3 V. */
 void ADC_setVREF(uint32_t base, ADC_ReferenceMode mode, ADC_ReferenceVoltage voltage)
 {
     (void)base;
-    codes_scale = ((mode == ADC_REFERENCE_INTERNAL) && (voltage == ADC_REFERENCE_3_3V)) ? 1.0 : 3.3 / 2.5;
+    other_reference = (mode != ADC_REFERENCE_INTERNAL) || (voltage != ADC_REFERENCE_3_3V);
 }
 void ADC_setPrescaler(uint32_t base, ADC_ClkPrescale divider) { (void)base, (void)divider; }
 void ADC_setInterruptPulseMode(uint32_t base, ADC_PulseMode mode) { (void)base, (void)mode; }
@@ -188,9 +187,9 @@ void start_conversions(unsigned module, enum trigger trigger)
 
 void converted(const struct conversion *conversion)
 {
-    const double scaled = conversion->code * codes_scale;
+    const unsigned larger = conversion->code * 33u / 25u;
 
-    results[conversion->slot] = (uint16_t)((scaled > 4095.0) ? 4095.0 : scaled);
+    results[conversion->slot] = !other_reference ? conversion->code : (uint16_t)((larger > 4095u) ? 4095u : larger);
     for (unsigned number = 0u; number < 2u; number++)
     {
         if (flag_on[number] && (flag_source[number] == conversion->slot))
