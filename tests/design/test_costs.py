@@ -7,6 +7,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from msgspec import UNSET
 
 from dzdesign.codegen.amplifier.device import device_named
 from dzdesign.codegen.amplifier.setting import amplifier_setting
@@ -132,12 +133,30 @@ def test_a_reading_flow_that_a_test_never_comes_to_leaves_no_worst_of_all_tests(
 
 
 def test_what_the_sweeps_cannot_tell_of_a_play_is_said_where_it_is_recommended(example_valve, capsys):
-    found = choices(example_valve)
+    found = choices(with_rates(example_valve, 0.0, 0.001))
     assert "play" in next(each.given for each in found if each.recommended)
     print_choices(found, "0.60 L/min")
     assert "small command cycles" in capsys.readouterr().out
     print_choices([each for each in found if "play" not in each.given], "0.60 L/min")
     assert "small command cycles" not in capsys.readouterr().out
+
+
+def with_rates(valve, left_s, error_s):
+    """The valve with what ramps of two rates show beside the declared lag."""
+    return replace(valve, meter=replace(valve.meter, left_by_rates_s=left_s, left_by_rates_se_s=error_s))
+
+
+@pytest.mark.parametrize(
+    ("left_s", "error_s", "why"),
+    [(UNSET, UNSET, "ramps of a second rate"), (0.2, 0.001, "narrower"), (-0.2, 0.001, "wider"),
+     (0.001, 0.1, "narrower"), (0.01, 0.001, "")],
+)  # fmt: skip
+def test_a_play_is_recommended_where_two_rates_gave_one_width(example_valve, left_s, error_s, why, capsys):
+    found = choices(with_rates(example_valve, left_s, error_s))
+    assert found[-1].recommended == (not why) and bool(found[-1].possible) == bool(why)
+    print_choices(found, "0.60 L/min")
+    printed = " ".join(capsys.readouterr().out.split())
+    assert why in printed and ("(possible)" in printed) == bool(why)
 
 
 def test_a_fixed_offset_leaves_what_an_amplifiers_setting_leaves(example_valve):

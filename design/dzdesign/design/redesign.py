@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
+from msgspec import UnsetType
 
 from dzdesign.core.artefact_reading import differences
 from dzdesign.core.errors import InputError, RequirementError, quoted
@@ -28,6 +29,7 @@ from dzdesign.design.lot_setting import prove_lot
 from dzdesign.design.lot_valves import LotSide
 from dzdesign.design.options import options_of
 from dzdesign.design.signals import SIDE_NAMES
+from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.ramp_result import TestResult
 
 #: Coarsest unit of the law's coefficients, see `dzdesign.design.side_design`.
@@ -40,8 +42,10 @@ WAYS: Mapping[str, Mapping[str, str]] = {
 }
 #: What an amplifier without pressure sensors does: the price of having none.
 FIXED = "fixed offset, no pressure sensors"
-#: Share of command by which a less simple choice must leave less to be recommended.
+#: Share of command by which a less simple choice must leave less to be recommended. A play must be right to it.
 WORTH = 0.002
+#: Standard errors by which the change of the hysteresis with the rate may be larger.
+RATE_ERRORS = 2.0
 
 
 def refuse_without_options(compensator: Compensator, source: str) -> None:
@@ -128,6 +132,13 @@ class HysteresisChoice:
     largest: float | None = None
     refused: str = ""
     recommended: bool = False
+    #: Why the recordings do not show that it works; empty where they do.
+    possible: str = ""
+
+    @property
+    def judged(self) -> str:
+        """Return whether it is recommended, or possible; nothing of another."""
+        return "recommended" if self.recommended else "possible" if self.possible else ""
 
     @property
     def left(self) -> float:
@@ -161,11 +172,35 @@ def hysteresis_choices(compensator: Compensator) -> tuple[HysteresisChoice, ...]
             found.append(HysteresisChoice(given=given, refused="the opening branch was not recorded"))
         else:
             found.append(_judged(given, made))
+    if not found[-1].refused:
+        found[-1] = replace(found[-1], possible=widths_unknown(compensator.valve))
     best = found[0]
     for other in found[1:]:
-        if other.left < best.left - WORTH:
+        if not other.possible and other.left < best.left - WORTH:
             best = other
     return tuple(replace(each, recommended=each is best and each.onset is not None) for each in found)
+
+
+def widths_unknown(valve: ValveModel) -> str:
+    """Say why the hysteresis of slower ramps is not known to be the recorded one; nothing where two rates show it.
+
+    A play inverts the recorded width. A valve whose hysteresis grows with the rate has less of it on a machine that
+    moves more slowly than the bench: the play then takes out more than there is.
+    """
+    left, error, units = valve.meter.left_by_rates_s, valve.meter.left_by_rates_se_s, valve.recorded_units
+    if isinstance(left, UnsetType) or isinstance(error, UnsetType):
+        if valve.meter.lag_is == "identified":
+            return "the ramps of two rates already serve to find the meter's lag; declare it with identify --meter-lag"
+        return "ramps of a second rate, half as fast or slower, would show whether the hysteresis depends on the rate"
+    tests = [test for side in valve.sides.values() for test in side.tests]
+    rate = max((test.conditions.rate_V_s or 0.0 for test in tests if test.conditions), default=0.0)
+    # At half the rate the width, which changes by twice the lag that is left, is narrower by the rate times that lag.
+    change_V, error_V = abs(left) * rate, RATE_ERRORS * error * rate
+    if change_V + error_V <= WORTH * valve.u_max_V:
+        return ""
+    found, uncertain = (units.text(1e3 * value, ".2g mV") for value in (change_V, error_V))
+    way = "narrower" if left > 0 else "wider"
+    return f"at half the ramps' rate the hysteresis is {way} by {found} ± {uncertain}, and a play has one width"
 
 
 def without_sensors(compensator: Compensator) -> HysteresisChoice:

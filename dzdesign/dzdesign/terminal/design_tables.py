@@ -21,7 +21,7 @@ HEADING = (
     "Remaining dead zone and hysteresis in % of full command. To the knee: largest over the whole tested range. To a "
     "flow: largest at the tests. Hysteresis: mean and largest of the tests"
 )
-#: Of the inverse play where it is recommended: the table is of the recorded sweeps.
+#: Of the inverse play where it would be an improvement: the table is of the recorded sweeps.
 PLAY = (
     "The play (backlash inverse) subtracts the hysteresis measured on full sweeps. In small command cycles the "
     "hysteresis may be smaller. The play may then subtract too much, up to its full width. Try small cycles on the "
@@ -113,7 +113,7 @@ def print_choices(
         return "-" if value is None else f"{value:.2%}"
 
     columns: dict[str, Column[HysteresisChoice]] = {
-        "choice": lambda each: each.given + (" (recommended)" if each.recommended else ""),
+        "choice": lambda each: each.given + (f" ({judged})" if (judged := each.judged) else ""),
         "opening dead zone, to knee": lambda each: share(each.onset),
         f"opening dead zone, to {read_at}": lambda each: share(each.reading),
         "hysteresis, mean": lambda each: share(each.hysteresis),
@@ -123,7 +123,10 @@ def print_choices(
     for each in choices:
         if each.refused:
             put_line(console, f"{each.given}: {each.refused}")
-    if any(each.recommended and "play" in each.given for each in choices):
+    for each in choices:
+        if each.possible:
+            put_line(console, f"{each.given} is possible, not recommended: {each.possible}.")
+    if any(each.judged and "play" in each.given for each in choices):
         put_line(console, PLAY)
     if not dithered:
         put_line(console, DITHER)

@@ -101,6 +101,8 @@ def _identified(
             lag_is=lag.origin,
             lag_longer_s=lag.longer,
             lag_shorter_s=lag.shorter,
+            left_by_rates_s=lag.left[0] if lag.left else UNSET,
+            left_by_rates_se_s=lag.left[1] if lag.left else UNSET,
             zero_L_min=options.meter_zero / L_MIN,
         ),
         knee_window=options.knee_window,

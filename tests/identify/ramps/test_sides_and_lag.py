@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec import UNSET
 
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_types import as_document
@@ -149,6 +150,14 @@ class TestLag:
             assert test.u_knee_rising_V == pytest.approx(5.4, abs=5e-3)
             assert test.u_knee_falling_V == pytest.approx(5.3, abs=5e-3)
             assert test.u_guard_lower_V < 5.3
+
+    def test_what_two_rates_show_beside_a_declared_lag_is_kept(self):
+        for declared in (0.1, 0.02):
+            meter = identify(two_rates(0.1), IdentifyOptions(meter_lag=declared)).meter
+            assert meter.left_by_rates_s == pytest.approx(0.1 - declared, abs=4 * meter.left_by_rates_se_s)
+            assert 0 < meter.left_by_rates_se_s < 0.02
+        one = identify(two_rates(0.1, seconds=(100.0,)), IdentifyOptions(meter_lag=0.1)).meter
+        assert one.left_by_rates_s is one.left_by_rates_se_s is UNSET
 
     def test_no_lag_is_found_where_there_is_none(self):
         valve = identify(two_rates(1e-6))

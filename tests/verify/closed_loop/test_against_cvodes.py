@@ -33,6 +33,7 @@ PLANTS = {
     "coil of 0.2 ms": {"L_c_H": 0.008},
     "ten times the flow force": {"flow_force_N_mm_MPa": 15.0},
     "ten times the flow force at a hard stop": {"flow_force_N_mm_MPa": 15.0, "stroke_mm": 0.6},
+    "a play that lags": {"hysteresis_lag_s": 0.02},
     "hard stop": {"stroke_mm": 1.2, "B_e_N_s_m": 3.0},
     # What a step is off by stays: the stop, and the edge, passed to and fro.
     "no damping": {"B_e_N_s_m": 0.0, "stroke_mm": 1.5},
@@ -157,6 +158,7 @@ FAULTS = {
     "a far stop 0.1 % too near": other_plant(stroke_mm=0.999),
     "half the play": other_plant(hysteresis_V=0.5),
     "the play on the wrong side": text("plant_period.h", "(plant->play - plant->mean", "(plant->mean - plant->play"),
+    "the play's lag": other_plant(hysteresis_lag_s=0.9),
     "the play of this period's current": text(
         "plant_period.h", "= plant->charge * p[PLANT_VOLTS_PER_CHARGE]", "= plant->state[CURRENT] * 6.0 / 6.6667"
     ),
@@ -184,8 +186,9 @@ FAULTS = {
 
 @pytest.fixture(scope="module")
 def at_the_stop(plant_scenes, plant):
-    """A plant whose spool meets the far stop at full command."""
-    return replace(plant_scenes[0], loop=plant_scenes[0].loop.with_plant(replace(plant, stroke_mm=1.5)))
+    """A plant whose spool meets the far stop at full command, and whose play lags."""
+    stopped = replace(plant, stroke_mm=1.5, hysteresis_lag_s=0.02)
+    return replace(plant_scenes[0], loop=plant_scenes[0].loop.with_plant(stopped))
 
 
 @needs_compiler

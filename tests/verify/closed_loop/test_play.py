@@ -63,6 +63,12 @@ def test_the_play_takes_the_hysteresis_out_and_nothing_flows_at_zero(made):
             assert least <= width <= most and last == 0.0, (name, scene.dp_MPa, width)
 
 
+def test_a_valve_of_less_hysteresis_at_a_slower_ramp_is_inverted_too_far(made):
+    for scene in made["play"][1]:
+        found = next(each for each in run_scenarios(scene) if "of which the play takes out all" in each.name)
+        assert -0.025 < found.figures["hysteresis_percent"] / 100 < -0.01 and found.q_zero_L_min == 0.0
+
+
 @pytest.mark.parametrize("times", [0.5, 2.0])
 def test_a_wrong_play_makes_no_flow_at_zero(made, plant, tmp_path, times):
     """Half and double of the width that the firmware counts on, in what it has and in the valve that it drives."""

@@ -42,6 +42,7 @@ PARAMETERS: Mapping[str, tuple[str, str]] = {
     "overlap_mm": ("mm", "Travel before the edge opens."),
     "stroke_mm": ("mm", "Travel to the stop."),
     "hysteresis_V": ("V", "Play between current and force, as command."),
+    "hysteresis_lag_s": ("s", "Lag of that play, which widens it with the rate."),
     "C_d_W_mm": ("mm", "Discharge coefficient times area gradient, Eq. (24)."),
     "rho_kg_m3": ("kg/m3", "Density, Eq. (24)."),
     "droop_MPa_L_min2": ("MPa/(L/min)^2", "Pressure drop lost per flow squared."),

@@ -184,8 +184,13 @@ class MeterLag:
     shorter: float
     #: What ramps of two rates tell, and its standard error, s, where that contradicts the declared one.
     contradicted_by: tuple[float, float] | None = None
-    #: Whether ramps of two rates tell the lag well enough to check one that was declared.
-    seen_by_rates: bool = False
+    #: What ramps of two rates show to be left of a declared lag, and its error, s; None where they tell nothing of it.
+    left: tuple[float, float] | None = None
+
+    @property
+    def seen_by_rates(self) -> bool:
+        """Whether ramps of two rates tell the lag well enough to check one that was declared."""
+        return self.origin == "identified" or self.left is not None
 
     @property
     def longest(self) -> float:
@@ -220,7 +225,6 @@ def find_lag(ramps: Sequence[Ramp], options: IdentifyOptions) -> MeterLag:
         longer=max(seconds - taken, 0.0) + LAG_ERRORS * se,
         # No meter runs ahead of the flow; a lag found below zero says that the command may come late.
         shorter=min(taken, LAG_ERRORS * se) if seconds >= 0 else taken - seconds + LAG_ERRORS * se,
-        seen_by_rates=True,
     )
 
 
@@ -257,7 +261,7 @@ def _declared(seconds: float, stated: float | None, left: tuple[float, float] | 
         longer=longer,
         shorter=shorter,
         contradicted_by=contradicted_by,
-        seen_by_rates=left is not None,
+        left=left,
     )
 
 

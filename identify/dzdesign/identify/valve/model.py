@@ -59,6 +59,12 @@ class Meter:
     """Largest amount by which the true lag may be shorter; it lowers the bounds on closing."""
     zero_L_min: Flow
     """Bound of the meter's zero error, by which all bounds are lowered."""
+    left_by_rates_s: Annotated[float, quantity("s", ge=-1e6, le=1e6)] | UnsetType = UNSET
+    """Lag that ramps of two rates show beside the declared one: half the change of the hysteresis' width with the
+    rate, which the valve may cause as well. Omitted if the ramps have one rate or if the lag was identified from
+    them."""
+    left_by_rates_se_s: Annotated[float, quantity("s", ge=0, le=1e6)] | UnsetType = UNSET
+    """Standard error of left_by_rates_s; omitted with it."""
 
     def lag_in_words(self) -> str:
         """Return the lag with its tolerance and how it is known."""

@@ -7,6 +7,7 @@ is on; the play follows the mean current of the last period within half the play
 is a constant force over the next one; a stop swallows the spool's speed, and holds it until the force leads away.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -214,7 +215,9 @@ class CvodesSpool:
         plant = self.plant
         A_per_V = plant.K_a / (plant.R_c_ohm + plant.r_p_ohm + plant.K_a * plant.K_fi_V_A)  # Eqs. (19)-(21) at rest
         half_A = plant.hysteresis_V / 2 * A_per_V
-        self.played_A = min(max(self.played_A, self.mean_A - half_A), self.mean_A + half_A)
+        within_A = min(max(self.played_A, self.mean_A - half_A), self.mean_A + half_A)
+        late = math.exp(-1e-3 * PERIOD_MS / plant.hysteresis_lag_s) if plant.hysteresis_lag_s else 0.0
+        self.played_A = late * self.played_A + (1 - late) * within_A
         push_N = plant.K_i_N_A * (self.played_A - self.mean_A + added_V * A_per_V)
         self.state[[1, 3]] = 0.0
         if mean_V is not None:

@@ -1,7 +1,7 @@
 """The plant of Eqs. (19)-(24), with what a real valve's measurements need; and its Runge-Kutta step, by CasADi, in C.
 
 Added to the paper's equations, each of them off where its parameter is zero: preload, overlap, stops, a pressure force
-that moves the threshold, flow force, a play in the magnetic force (hysteresis), droop of the supply.
+that moves the threshold, flow force, a play in the magnetic force (hysteresis) and its lag, droop of the supply.
 
 A step is taken in one of three states of the spool: open and shut on either side of the metering edge, where the
 equations are smooth, and held at a stop, where only the current goes on. plant.h shortens a step to where it meets a
@@ -44,8 +44,8 @@ SPOOL_RAD, COIL_RAD = 0.1, 0.12
 UNDAMPED, SHORTER = 0.02, 4.0
 #: Numbers of a plant that plant.h and the step read by name, in SI units where none stands.
 NAMED = (
-    "STROKE_M", "OVERLAP_M", "HALF_PLAY_V", "VOLTS_PER_CHARGE", "U_MAX_V", "PERIOD_S", "FULL_A", "PUSH", "STEPS_PER_S",
-    "LINEAR", "DECAY", "DRIVE", "PULL", "SPRING", "DAMPING", "PER_KG",
+    "STROKE_M", "OVERLAP_M", "HALF_PLAY_V", "PLAYED", "VOLTS_PER_CHARGE", "U_MAX_V", "PERIOD_S", "FULL_A", "PUSH",
+    "STEPS_PER_S", "LINEAR", "DECAY", "DRIVE", "PULL", "SPRING", "DAMPING", "PER_KG",
 )  # fmt: skip
 
 
@@ -74,6 +74,7 @@ class Plant:
     overlap_mm: Annotated[float, _parameter("mm", "Travel before the edge opens.")] = 0.3
     stroke_mm: Annotated[float, _parameter("mm", "Travel to the stop.")] = 2.2
     hysteresis_V: Annotated[float, _parameter("V", "Play between current and force, as command.")] = 0.15
+    hysteresis_lag_s: Annotated[float, _parameter("s", "Lag of that play, which widens it with the rate.")] = 0.0
     C_d_W_mm: Annotated[float, _parameter("mm", "Discharge coefficient times area gradient, Eq. (24).")] = 3.2
     rho_kg_m3: Annotated[float, _parameter("kg/m3", "Density of the oil, Eq. (24).")] = 860.0
     droop_MPa_L_min2: Annotated[float, _parameter("MPa/(L/min)^2", "Loss of pressure drop per flow squared.")] = 4e-4
@@ -107,6 +108,10 @@ class Plant:
     def with_oil(self, viscosity: float, density: float) -> "Plant":
         """Return the plant with other oil, by factors of viscosity and density; the damping follows the viscosity."""
         return replace(self, B_e_N_s_m=self.B_e_N_s_m * viscosity, rho_kg_m3=self.rho_kg_m3 * density)
+
+    def with_hysteresis(self, share: float) -> "Plant":
+        """Return the plant with so many times the hysteresis."""
+        return replace(self, hysteresis_V=share * self.hysteresis_V, hysteresis_lag_s=share * self.hysteresis_lag_s)
 
     def swings_rad_s(self, dp_MPa: float) -> float:
         """Return the rate of the spool's free motion against spring and flow force at a pressure drop."""
@@ -220,6 +225,7 @@ def numbers_of(plant: Plant, dp_MPa: float, drive: float = 1.0) -> np.ndarray:
     full_A = per_V * plant.u_max_V / decay
     named = (
         plant.stroke_mm * 1e-3, plant.overlap_mm * 1e-3, plant.hysteresis_V / 2,
+        1 - math.exp(-PWM_PERIOD_S / plant.hysteresis_lag_s) if plant.hysteresis_lag_s else 1.0,
         plant.K_i_N_A / plant.force_per_volt / PWM_PERIOD_S, drive * plant.u_max_V, PWM_PERIOD_S, drive * full_A,
         plant.force_per_volt / plant.m_e_kg, 1 / plant.step_s(dp_MPa), linear, decay, per_V, by_state[2, 0],
         -by_state[2, 1], -by_state[2, 2], -by_given[2, 1],

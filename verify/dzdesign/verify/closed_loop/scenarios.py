@@ -12,6 +12,7 @@ import numpy as np
 from dzdesign.verify.closed_loop.declared_machine import all_at_the_worst, readings_off
 from dzdesign.verify.closed_loop.drive_corners import coil_and_supply
 from dzdesign.verify.closed_loop.loop import LoopRun
+from dzdesign.verify.closed_loop.ramps import hysteresis_of
 from dzdesign.verify.closed_loop.scene import NO_CORE_CAN_KNOW, SETTLE_S, STEP_S, Ends, Scene, ramp
 from dzdesign.verify.loop_results import ScenarioResult
 
@@ -22,6 +23,10 @@ NOISE = 0.002
 SEED = 1
 #: Viscosity (damping goes with it) and density of a mineral oil of class VG 46 against 40 °C: about 0 °C and 80 °C.
 OILS = {"cold oil, 8 times the viscosity": (8.0, 1.03), "hot oil, a quarter of the viscosity": (0.25, 0.97)}
+#: Hysteresis of a valve at a slower ramp than the bench's, over the recorded one.
+SLOWER = 0.5
+#: Time of its ramp, slow against coil and spool, s.
+SLOW_S = 20.0
 #: Names of the pressure sensors.
 SENSORS = ("A", "B")
 #: Pressure drops above the tested ones, over the highest of these.
@@ -44,6 +49,8 @@ def run_scenarios(scene: Scene) -> Iterator[ScenarioResult]:
     yield from coil_and_supply(scene)
     yield from all_at_the_worst(scene)
     yield from _oils(scene)
+    if scene.compensator.drive_functions.has_play:
+        yield _slower_ramp(scene)
 
 
 def _steps(scene: Scene) -> ScenarioResult:
@@ -202,6 +209,21 @@ def _oils(scene: Scene) -> Iterator[ScenarioResult]:
         warm = replace(scene, loop=scene.loop.with_plant(scene.loop.plant.with_oil(viscosity, density)))
         run = warm.run(warm.opened_and_closed())
         yield warm.result(name, run, figures={"largest_flow_L_min": run.q_mean_L_min.max()})
+
+
+def _slower_ramp(scene: Scene) -> ScenarioResult:
+    """A ramp at which the valve has half its hysteresis, as one may whose hysteresis grows with the rate.
+
+    The play takes out the recorded one: below zero the branches lie the other way round.
+    """
+    loop = scene.loop.with_plant(scene.loop.plant.with_hysteresis(SLOWER))
+    slow_s = max(SLOW_S, loop.slowest_ramp_s)
+    command = np.concatenate(
+        [scene.waited(slow_s), ramp(0, 1, slow_s), scene.held(1), ramp(1, 0, slow_s), scene.held(0)]
+    )
+    run = replace(scene, loop=loop).run(command)
+    width = {"hysteresis_percent": 100 * hysteresis_of(run)}
+    return scene.result("half the hysteresis, of which the play takes out all", run, figures=width)
 
 
 def sensor_failures(scene: Scene) -> Iterator[ScenarioResult]:

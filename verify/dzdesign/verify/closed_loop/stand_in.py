@@ -35,6 +35,8 @@ class StandIn:
     dynamics: Plant
     #: Flow over that of the tests, for oil of another density.
     flow_scale: float = 1.0
+    #: Distance of the branches over the recorded one.
+    hysteresis: float = 1.0
 
     @property
     def parameters(self) -> Plant:
@@ -54,15 +56,27 @@ class StandIn:
             entries: list[float] = []
             points: list[np.ndarray] = []
             place = TEST_HEAD + SAG_STEPS + 1
-            for branch in (curve.opening, curve.closing):
-                count = len(branch.u_V)
-                entries += [_first_seen(branch, self.dynamics.u_max_V), place, place + count, count]
-                points += [np.array(branch.u_V), np.array(branch.q_L_min) / largest]
+            for branch, other in ((curve.opening, curve.closing), (curve.closing, curve.opening)):
+                count, u_V, seen_V = len(branch.u_V), np.array(branch.u_V), _first_seen(branch, self.dynamics.u_max_V)
+                if self.hysteresis != 1.0:
+                    u_V, seen_V = self._moved(branch, other)
+                entries += [seen_V, place, place + count, count]
+                points += [u_V, np.array(branch.q_L_min) / largest]
                 place += 2 * count
             tests.append(np.concatenate([[test.dp_MPa or 0.0, largest], entries, sag / sag[0], *points]))
             starts.append(begin)
             begin += tests[-1].size
         return np.concatenate([head, starts, *tests])
+
+    def _moved(self, branch: RecordedBranch, other: RecordedBranch) -> tuple[np.ndarray, float]:
+        """Return the commands of a branch, and that of its first flow seen, moved towards those of the other."""
+        share, u_V, q = (1 - self.hysteresis) / 2, np.array(branch.u_V), np.array(branch.q_L_min)
+        seen_V = _first_seen(branch, self.dynamics.u_max_V)
+        between_V = np.interp(q, np.maximum.accumulate(other.q_L_min), other.u_V) - u_V
+        # Below the first flow seen a flow tells no command.
+        of_seen_V = _first_seen(other, self.dynamics.u_max_V) - seen_V
+        between_V = np.where(u_V <= seen_V, of_seen_V, between_V)
+        return np.maximum.accumulate(np.maximum(u_V + share * between_V, 0.0)), seen_V + share * of_seen_V
 
     @property
     def _slopes(self) -> list[float]:
@@ -82,6 +96,10 @@ class StandIn:
         levels = np.array([test.noise_level_L_min for test in self.side.tests])
         above = int(np.clip(np.searchsorted(dp, dp_MPa), 0, dp.size - 1))
         return float(max(levels[max(above - 1, 0) if dp[above] > dp_MPa else above], levels[above]))
+
+    def with_hysteresis(self, share: float) -> "StandIn":
+        """Return it with so many times the hysteresis."""
+        return replace(self, hysteresis=share * self.hysteresis)
 
     def with_oil(self, viscosity: float, density: float) -> "StandIn":
         """Return it with oil of so many times the viscosity and density."""

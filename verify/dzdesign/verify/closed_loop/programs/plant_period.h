@@ -44,7 +44,7 @@ static inline void plant_period(struct plant *plant, int32_t compare)
     const double high = plant->mean + p[PLANT_HALF_PLAY_V];
     const double on = p[PLANT_PERIOD_S] * (double)compare / (double)plant->counts;
 
-    plant->play = (plant->play < low) ? low : ((plant->play > high) ? high : plant->play);
+    plant->play += p[PLANT_PLAYED] * (fmin(fmax(plant->play, low), high) - plant->play);
     plant->push = (plant->play - plant->mean + plant->bias) * p[PLANT_PUSH];
     plant->charge = plant->state[TRAVEL] = 0.0;
     if (compare > 0) {
