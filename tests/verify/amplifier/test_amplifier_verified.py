@@ -58,6 +58,7 @@ def failed_of(device, content, compensator, stated):
         ("one", "west", "MIN:A 4892\r", "MIN:A 4892\x0b", READ_BACK),
         ("one", "cia408", "ParameterValue=8016", "ParameterValue=0x1F50", READ_BACK),
         ("one", "cia408", "[6345sub1]", "[6346sub1]\r\nParameterValue=9000\r\n\r\n[6345sub1]", READ_BACK),
+        ("one", "cia408", "DefaultValue=1", "DefaultValue=2", READ_BACK),
         ("one", "cia408", "[FileInfo]", "[DEFAULT]\r\nParameterValue=9000\r\n\r\n[FileInfo]", READ_BACK),
         ("one", "beckhoff", "END_VAR", "END_VAR\r\nValveCharacteristicTable[2,2] := 0.9;", READ_BACK),
         ("one", "beckhoff", "END_VAR", "    x : INT := 1;\r\nEND_VAR", READ_BACK),

@@ -131,7 +131,15 @@ def _dcf(setting: AmplifierSetting, head: Sequence[str]) -> Iterable[str]:
     for each in objects:
         section = f"{each.index:04X}"
         if each.sub_index is not None:
-            sections[section] = {"ParameterName": each.name, "ObjectType": "0x9", "SubNumber": "1"}
+            sections[section] = {"ParameterName": each.name, "ObjectType": "0x9", "SubNumber": "2"}
+            sections[f"{section}sub0"] = {
+                "ParameterName": "HighestSubIndexSupported",
+                "ObjectType": "0x7",
+                "DataType": "0x0005",
+                "AccessType": "const",
+                "DefaultValue": str(each.sub_index),
+                "PDOMapping": "0",
+            }
             section += f"sub{each.sub_index:X}"
         sections[section] = {
             "ParameterName": each.name,

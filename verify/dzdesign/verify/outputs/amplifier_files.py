@@ -9,6 +9,7 @@ from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from io import StringIO
 from itertools import pairwise
 
 from dzdesign.core.errors import InputError
@@ -24,7 +25,8 @@ COUNT = re.compile(r"0|[1-9][0-9]{0,8}")
 #: A character that no file has: another line end, for one, may part lines here and not in the device.
 STRANGE = re.compile(r"[^\r\n -~]")
 #: Objects of CiA 408 that the dead band has; beside them a file would set what nobody certified.
-OBJECTS = {"6342", "6343", "6343sub1", "6344", "6344sub1", "6345", "6345sub1"}
+RECORDS = ("6343", "6344", "6345")
+OBJECTS = {"6342", *(record + entry for record in RECORDS for entry in ("", "sub0", "sub1"))}
 #: All of a TF5810 file but its comments.
 TABLE_TEXT = re.compile(
     r"\s*VAR_GLOBAL\s+ValveCharacteristicTable : ARRAY\[1\.\.100,1\.\.2\] OF LREAL := \[([^\]]*)\];"
@@ -102,16 +104,26 @@ def _west(text: str) -> Mapping[int, FileLaw]:
 
 
 def _cia408(text: str) -> Mapping[int, FileLaw]:
+    from canopen.objectdictionary.eds import import_eds
+
     entries = configparser.ConfigParser(interpolation=None)
     entries.read_string(text)
 
     def value(section: str) -> int:
-        return _count(entries[section]["ParameterValue"])
+        found = _count(entries[section]["ParameterValue"])
+        index, _, entry = section.partition("sub")
+        read = dictionary[int(index, 16)]
+        if (read[int(entry)] if entry else read).value != found:
+            raise ValueError(f"as canopen reads it, 0x{section} is not {found}")
+        return found
 
     objects = {section for section in entries.sections() if re.match(r"[0-9A-Fa-f]{4}", section)}
     if objects != OBJECTS or entries.defaults():
         others = sorted(objects ^ OBJECTS) or sorted(entries.defaults())
         raise ValueError(f"its objects are not those of the dead band: {', '.join(others)[:40]}")
+    dictionary = import_eds(StringIO(text), None)
+    if any(dictionary[int(record, 16)][0].default != 1 for record in RECORDS):
+        raise ValueError("sub-index 0 of a record is not 1, its highest")
     if value("6342") != 1:
         raise ValueError("0x6342 is not 1, the function that jumps")
     sides = {1: (value("6343sub1"), INCREMENTS), -1: (value("6344sub1"), INCREMENTS)}
