@@ -14,6 +14,7 @@ that lies above the threshold cycles at any gain: about zero the valve is never 
 """
 
 from dataclasses import dataclass
+from functools import cache
 from math import atan, ceil, floor, hypot, log10, pi
 
 import numpy as np
@@ -153,6 +154,7 @@ class LargestGain:
     linear: float
 
 
+@cache
 def largest_gain(loop: Swinging) -> float:
     """Return the largest velocity gain up to which the loop comes to rest, 1/s; 0 if it never does."""
     tried = GAINS * loop.linear_gain

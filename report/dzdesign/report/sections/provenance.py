@@ -7,10 +7,12 @@ from dzdesign.core.display import NOT_CHECKED, NOT_REQUIRED
 from dzdesign.core.documents import written_by
 from dzdesign.core.errors import InputError, and_more
 from dzdesign.core.recorded_units import RecordedUnits
+from dzdesign.design import position_loop
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs import lines_of_tests
 from dzdesign.design.costs_at_tests import CostAtTest, costs_at_tests
 from dzdesign.design.pressure_inputs import signals_in_words
+from dzdesign.design.redesign import without_sensors
 from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.artefacts import ROLES, Chain, standing_warnings
@@ -100,8 +102,18 @@ def _artefacts_table(chain: Chain) -> Table:
 
 
 def remaining_section(compensator: Compensator) -> Section:
-    """Return the section with a table a side."""
-    return Section(tables=[_table(compensator, sign, costs) for sign, costs in _costs(compensator)])
+    """Return the section with a table a side, what a fixed offset would leave, and a position loop's largest gain."""
+    tables = [_table(compensator, sign, costs) for sign, costs in _costs(compensator)]
+    loops = (f"{line[:1].upper()}{line[1:]}." for line in position_loop.in_words(compensator))
+    return Section(tables=tables, lines=(*_fixed(compensator), *loops))
+
+
+def _fixed(compensator: Compensator) -> Iterator[str]:
+    fixed = without_sensors(compensator)
+    if fixed.onset is not None:
+        at = compensator.valve.recorded_units.text(compensator.reading_flow_L_min, ".2f L/min")
+        read = "" if fixed.reading is None else f", {fixed.reading:.2%} read at {at}"
+        yield f"One fixed offset, which needs no pressure sensors, would leave {fixed.onset:.2%} on opening{read}."
 
 
 def other_costs(compensator: Compensator) -> tuple[str, ...]:
