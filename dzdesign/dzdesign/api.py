@@ -5,7 +5,8 @@ Each function takes paths or the result of the previous stage. Options are writt
 ``output`` a function also writes the file or folder of the command of the same stage, byte for byte. Nothing is
 printed, and heavy packages are imported when a stage is called.
 
-`init`, `simulate`, `assess`, `report`, `batch` and `calibration` correspond to the commands of the same names;
+`run` is the whole chain with one options file. `init`, `simulate`, `assess`, `report`, `batch` and `calibration`
+correspond to the commands of the same names;
 `read_calibration` corresponds to `calibration --read`.
 
 >>> from dzdesign import api
@@ -28,6 +29,7 @@ from dzdesign.stages import generate as generate_stage
 from dzdesign.stages import identify as identify_stage
 from dzdesign.stages import init as init_stage
 from dzdesign.stages import report as report_stage
+from dzdesign.stages import run as run_stage
 from dzdesign.stages import simulate as simulate_stage
 from dzdesign.stages import verify as verify_stage
 from dzdesign.terminal.notebook import heading_of, html_of, text_of
@@ -35,7 +37,7 @@ from dzdesign.terminal.notebook import heading_of, html_of, text_of
 __all__ = [
     "DzdesignError", "InputError", "RequirementError",
     "assess", "batch", "calibration", "design", "generate", "identify", "init", "read_calibration",
-    "report", "simulate", "verify",
+    "report", "run", "simulate", "verify",
 ]  # fmt: skip
 
 
@@ -47,6 +49,7 @@ def __dir__() -> list[str]:
 display_by(heading=heading_of, text=text_of, html=html_of)
 
 init = with_keywords(init_stage.InitArguments, init_stage.init)
+run = with_keywords(run_stage.RunArguments, run_stage.run)
 identify = with_keywords(identify_stage.IdentifyArguments, identify_stage.identify)
 design = with_keywords(design_stage.DesignArguments, design_stage.design)
 generate = with_keywords(generate_stage.GenerateArguments, generate_stage.generate)

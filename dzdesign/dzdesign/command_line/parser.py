@@ -35,6 +35,7 @@ PIPELINE, EVIDENCE, SETUP = "from ramps to firmware", "evidence", "getting start
 
 COMMANDS = {
     "init": Command(PIPELINE, "inspect recordings and write a commented dzdesign.toml"),
+    "run": Command(PIPELINE, "identify, design, codegen and verify, with the options of one file"),
     "identify": Command(PIPELINE, "fit the valve to its ramp tests: gain, thresholds and beta(dP), in valve.json"),
     "design": Command(PIPELINE, "compute the certified law with exact coefficients, in compensator.json"),
     "codegen": Command(PIPELINE, "write C firmware, or Structured Text, FMUs, a MATLAB function, an amplifier's file"),
@@ -55,10 +56,7 @@ COMMANDS = {
 EXAMPLES = (
     "dzdesign demo demo                       run the whole chain on the bundled example",
     "dzdesign init ramps/*.csv                inspect recordings and write dzdesign.toml",
-    "dzdesign identify ramps/*.csv --config dzdesign.toml",
-    "dzdesign design valve.json               with --command-signal for a valve driven to both sides",
-    "dzdesign codegen compensator.json --target f28335",
-    "dzdesign verify firmware --ramps ramps/*.csv",
+    "dzdesign run dzdesign.toml               from the recordings to checked firmware and a report",
 )
 
 

@@ -14,15 +14,12 @@ from pkgutil import resolve_name
 from typing import Any
 
 from dzdesign.core.errors import RequirementError, one_line
-from dzdesign.core.options import paths_of
 from dzdesign.terminal.page import print_json, say_results
 
 NOT_LOOKED_AT = (
     "Until that is settled, full command, sides and meter are not looked at. Init with that option and another -o "
     "does so."
 )
-#: Names of recordings that are repeated in the command to give next.
-MOST_NAMES = 3
 #: A name or a pattern in which no shell finds anything but a name or a pattern.
 PLAIN = re.compile(r"[\w ./*?:\[\],+@%=-]*")
 
@@ -107,6 +104,16 @@ def _holds(result: Any, arguments: Any) -> bool:
     return bool(result.holds)
 
 
+def _after_run(made: Any, arguments: Any) -> Iterator[str]:
+    for each in made.stages:
+        yield f"{each.stage:10}{'unchanged' if each.unchanged else 'done':11}{each.path}"
+    if made.warnings:
+        codes = (code + (f" ({count})" if count > 1 else "") for code, count in made.warnings.items())
+        yield f"warnings about the recordings: {', '.join(codes)}"
+    yield made.verdict
+    yield f"Open first: {made.report}"
+
+
 def _whole_lot(summary: Any, arguments: Any) -> bool:
     """Return True; raise if any valve could not be calibrated."""
     if summary.failed:
@@ -122,10 +129,8 @@ def _lines_of_proposal(proposal: Any, arguments: Any) -> Iterator[str]:
     yield from (f"open: {line}" for line in proposal.opens)
     if proposal.opens and proposal.u_seen_V is None:
         yield NOT_LOOKED_AT
-    ramps = [os.fspath(path) for path in paths_of(arguments.ramps)]
-    names = " ".join(map(_word, ramps)) if 0 < len(ramps) <= MOST_NAMES else "RAMP..."
     yield f"Written: {arguments.output}" + ("; fill in what is open, then" if proposal.opens else "; read it, then")
-    yield f"  dzdesign identify {names} --config {_word(os.fspath(arguments.output))}"
+    yield f"  dzdesign run {_word(os.fspath(arguments.output))}"
 
 
 def _document_of_proposal(proposal: Any, arguments: Any) -> dict[str, Any]:
@@ -151,6 +156,11 @@ RELAYS: Mapping[str, Relay] = {
         "stages.init:InitArguments", "stages.init:init",
         ("dzdesign init ramps/*.csv", "dzdesign init ramps/*.tdms -o bench2.toml"),
         "", _lines_of_proposal, document=_document_of_proposal, holds=lambda proposal, arguments: not proposal.opens,
+    ),
+    "run": Relay(
+        "stages.run:RunArguments", "stages.run:run",
+        ("dzdesign run dzdesign.toml", "dzdesign run dzdesign.toml -o valve_4711"),
+        "", _after_run, holds=_holds, document=lambda made, arguments: made.evidence,
     ),
     "identify": Relay(
         "stages.identify:IdentifyArguments", "stages.identify:identify",

@@ -102,7 +102,7 @@ def propose(arguments: "InitArguments") -> Proposal:
         skip_rows=read["skip_rows"], missing=read["missing"] or (), ends_at_full=ENDS_AT_FULL,
         sample_rate=arguments.sample_rate,
         meter=valve and valve.meter, negative_drop=_negative_drop(valve),
-        first=paths[0].name, look=looks[0], columns=chosen,
+        ramps=[os.fspath(path) for path in patterns or paths], first=paths[0].name, look=looks[0], columns=chosen,
         unclear=unclear, guessed_dp=guessed_dp, dp=table, readings=readings,
     )  # fmt: skip
     return Proposal(
