@@ -34,6 +34,13 @@ def here(tmp_path, monkeypatch):
     return tmp_path
 
 
+def options_of(text):
+    """What a proposed file says beside the recordings, which stand in every one."""
+    options = tomllib.loads(text)
+    assert options.pop("ramps")
+    return options
+
+
 def init_then_identify(*ramps, more=()):
     """Run init, then identify with its file; return init's report and the valve."""
     assert main(["-q", "init", *ramps, *more]) == 0
@@ -48,14 +55,15 @@ def test_the_bundled_recordings(here, example_folder, capsys):
             shutil.copy(path, here)
     text, valve = init_then_identify("*.csv.gz")
     said = capsys.readouterr().out
-    assert tomllib.loads(text) == {"u-max": "10 V"}  # what identify finds by itself stays a comment
+    assert options_of(text) == {"u-max": "10 V"}  # what identify finds by itself stays a comment
     assert "positive commands: 6 ramps at 1, 4 MPa, up to 24.9 L/min" in text and "negative" not in text
     for warning in valve["warnings"]:
         assert f"# warning [{warning['code']}] " in text
     assert f"identify finds {valve['meter']['floor_L_min']:.2f} L/min" in text
     assert "the recordings can't tell it (it takes ramps of two rates)" in text
     assert '# u = "u_V"  (in V; understood by its label)' in text
-    assert "Written: dzdesign.toml" in said and "dzdesign identify *.csv.gz --config dzdesign.toml" in said
+    assert tomllib.loads(text)["ramps"] == ["*.csv.gz"]
+    assert "Written: dzdesign.toml" in said and "dzdesign run dzdesign.toml" in said
 
 
 def test_labels_of_another_program_and_pressures_in_the_names(here):
@@ -63,7 +71,7 @@ def test_labels_of_another_program_and_pressures_in_the_names(here):
         time, u, _, q = columns_of(dp_MPa, knee=knee)
         write(f"ramp_{10 * dp_MPa:.0f}bar.csv", LABELS, time, u, q, 0 * q + 40)
     text, valve = init_then_identify("ramp_*.csv")
-    assert tomllib.loads(text) == {
+    assert options_of(text) == {
         "u-max": "10 V",
         "columns": {"time": "Zeit (s)", "u": "AO0 [V]", "Q": "Durchfluss [L/min]"},
         "dp": {"ramp_10bar.csv": "10 bar", "ramp_40bar.csv": "40 bar"},
@@ -76,7 +84,7 @@ def test_both_signs_and_a_smaller_command(here):
         time, u, dp, q = columns_of(1.0, sign=sign, knee=5.0)
         write(name, "t_s,u_V,dP_MPa,Q_Lmin", time, u / 2, dp, q)
     text, valve = init_then_identify("up.csv", "down.csv")
-    assert tomllib.loads(text) == {"u-max": "5 V"}
+    assert options_of(text) == {"u-max": "5 V"}
     assert "# Full command: the ramps end at 5.00 V." in text
     assert "positive commands: 1 ramp at 1 MPa" in text and "negative commands: 1 ramp at 1 MPa" in text
     assert set(valve["sides"]) == {"positive", "negative"}
@@ -94,7 +102,7 @@ def test_ramps_that_stop_short_make_full_command_a_guess(here):
     time, u, dp, q = columns_of(1.0)
     write("ramp.csv", "t_s,u_V,dP_MPa,Q_Lmin", *(column[u <= 8] for column in (time, u, dp, q)))
     text, _ = init_then_identify("ramp.csv")
-    assert tomllib.loads(text) == {"u-max": "10 V"}
+    assert options_of(text) == {"u-max": "10 V"}
     assert "# Full command: a guess, for the ramps end at 8.00 V." in text
 
 
@@ -134,7 +142,7 @@ def test_what_can_not_be_told_is_left_open_with_the_reason(here, capsys, labels,
     assert ("say what the signal means, for example" in said) == ("Q_mA" in labels)
     text = Path("dzdesign.toml").read_text()
     assert f"# OPEN: column of {reason}" in text and f'# {reason[0]} = "LABEL:UNIT"' in text
-    assert reason[0] not in tomllib.loads(text).get("columns", {})
+    assert reason[0] not in options_of(text).get("columns", {})
 
 
 @pytest.mark.parametrize(
@@ -199,7 +207,7 @@ def test_a_pressure_with_a_foreign_name_is_used_and_not_that_of_the_files_name(h
         time, u, dp, q = columns_of(dp_MPa, knee=knee)
         write(f"ramp_{10.5 * dp_MPa:.0f}bar.csv", f"{others},{label},Q_Lmin", time, u, 10 * dp, q)
     text, valve = init_then_identify("ramp_*.csv")
-    table = tomllib.loads(text)
+    table = options_of(text)
     assert [test["dp_MPa"] for test in valve["sides"]["positive"]["tests"]] == pytest.approx([1.0, 4.0], rel=1e-3)
     if label != "Delta P (bar)":  # that one is understood
         assert table["columns"]["dP"] == label and "dp" not in table
@@ -241,7 +249,7 @@ def test_a_command_in_per_cent_under_another_name(here):
     time, u, dp, q = columns_of(1.0)
     write("ramp.csv", "t_s,Sollwert [%],dP_MPa,Q_Lmin", time, 10 * u, dp, q)
     text, _ = init_then_identify("ramp.csv")
-    assert tomllib.loads(text)["columns"] == {"u": "Sollwert [%]"} and "recordings in per cent don't say it" in text
+    assert options_of(text)["columns"] == {"u": "Sollwert [%]"} and "recordings in per cent don't say it" in text
     write("current.csv", "t_s,I [mA],dP_MPa,Q_Lmin", time, 4 + 1.6 * u, dp, q)
     Path("dzdesign.toml").unlink()
     text, _ = init_then_identify("current.csv", more=("--columns", "u=I [mA]:4..20 mA = 0..100 %"))
@@ -317,7 +325,7 @@ def test_a_pressure_from_a_name_is_said_and_units_as_people_write_them(here, cap
     text, valve = init_then_identify("ramp_4MPa.csv")
     said = capsys.readouterr().out
     assert "pressure drop by the files' names: 4 MPa" in said and "1 ramp at 4 MPa" in said
-    assert tomllib.loads(text)["dp"] == {"ramp_4MPa.csv": "4 MPa"}
+    assert options_of(text)["dp"] == {"ramp_4MPa.csv": "4 MPa"}
     assert valve["sides"]["positive"]["tests"][0]["dp_MPa"] == 4.0
     assert '# Q = "Q_Lmin"  (in L/min; understood by its label)' in text
 
@@ -357,7 +365,7 @@ def test_a_p_stands_for_a_point(here):
         write(path, "t_s,u_V,Q_Lmin", time, u, q * dp_MPa**0.5)
         write(f"with_{path}", "t_s,u_V,dP_MPa,Q_Lmin", time, u, 0.99 * dp, q * dp_MPa**0.5)
     text, valve = init_then_identify("Rampe_*.txt")
-    assert tomllib.loads(text)["dp"] == {name: "0.5 MPa", "Rampe_1MPa.txt": "1 MPa"}
+    assert options_of(text)["dp"] == {name: "0.5 MPa", "Rampe_1MPa.txt": "1 MPa"}
     assert [test["dp_MPa"] for test in valve["sides"]["positive"]["tests"]] == [0.5, 1.0]
     assert main(["init", "with_*", "-o", "with.toml"]) == 0 and "CHECK" not in Path("with.toml").read_text()
 
@@ -382,7 +390,7 @@ def test_a_name_that_can_be_read_in_two_ways_is_asked(here, capsys, others):
     assert "open: pressure drop of 'Rampe_2_5MPa.txt': its name may say 2.5 MPa or 5 MPa; declare the right one" in said
     text = Path("dzdesign.toml").read_text()
     assert '# "Rampe_2_5MPa.txt" = "2.5 MPa"\n# "Rampe_2_5MPa.txt" = "5 MPa"\n' in text
-    assert tomllib.loads(text).get("dp", {}) == {path: "1 MPa" for path in others}
+    assert options_of(text).get("dp", {}) == {path: "1 MPa" for path in others}
 
 
 def test_one_stuck_sensor_and_flows_that_differ_are_said(here, capsys):
@@ -403,7 +411,7 @@ def test_several_recordings_without_a_pressure_are_open(here, capsys):
     assert main(["init", "r1.csv", "r2.csv"]) == 1
     assert "open: pressure drop of 'r1.csv': no column, and none in its name" in capsys.readouterr().out
     text = Path("dzdesign.toml").read_text()
-    assert '# "r2.csv" = "1 MPa"' in text and tomllib.loads(text) == {"u-max": "10 V"}
+    assert '# "r2.csv" = "1 MPa"' in text and options_of(text) == {"u-max": "10 V"}
 
 
 def test_a_file_that_exists_stays(here, capsys):
@@ -432,14 +440,14 @@ def test_hostile_labels_stay_strings_of_toml(here):
     time, u, dp, q = columns_of(1.0)
     write("ramp.csv", 't_s,"A ""0\\x\x7f [V]",dP_MPa,Q_Lmin,"] = 1\x1b[2J #"', time, u, dp, q, q)
     text, _ = init_then_identify("ramp.csv")
-    assert set(tomllib.loads(text)) == {"u-max", "columns"} and "\x1b" not in text
+    assert set(options_of(text)) == {"u-max", "columns"} and "\x1b" not in text
 
 
 @pytest.mark.skipif(os.name == "nt", reason="names that Windows has not")
-@pytest.mark.parametrize("name", ["$(touch x).csv", ";touch x;.csv", "`id` a.csv", "a'b.csv", "a b.csv", "&.csv"])
+@pytest.mark.parametrize("name", ["$(touch x).toml", ";touch x;.toml", "`id` a.toml", "a'b.toml", "a b.toml", "&.toml"])
 def test_the_command_to_give_next_is_one_that_a_shell_reads_as_it_is_meant(name, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / name).write_text("time_s,u_V\n0,1\n", encoding="utf-8")
-    main(["init", name, "-o", "options.toml"])
+    (tmp_path / "ramp.csv").write_text("time_s,u_V\n0,1\n", encoding="utf-8")
+    main(["init", "ramp.csv", "-o", name])
     last = capsys.readouterr().out.splitlines()[-1]
-    assert shlex.split(last) == ["dzdesign", "identify", name, "--config", "options.toml"]
+    assert shlex.split(last) == ["dzdesign", "run", name]
