@@ -50,6 +50,7 @@ COMMANDS = {
     "simulate": Command(SETUP, "simulate ramp tests of a valve; the files are marked as simulated"),
     "monitor": Command(SETUP, "record the telemetry of a running firmware as a ramp file"),
     "load": Command(SETUP, "load a calibration block into an amplifier over its serial line"),
+    "explain": Command(SETUP, "explain a warning or a requirement by its code"),
     "doctor": Command(SETUP, "list compilers and simulators, and how to install what is missing"),
 }
 #: Of the front page.

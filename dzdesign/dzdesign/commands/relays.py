@@ -63,13 +63,12 @@ def _written(result: Any, arguments: Any) -> tuple[str, ...]:
 
 
 def _after_identify(valve: Any, arguments: Any) -> tuple[str, ...]:
-    if len(valve.sides) < 2:
-        return _written(valve, arguments)
-    return (
-        *_written(valve, arguments),
-        "Next, for commands of both signs; state the signal at your converter (and --config, if you use it):",
-        f'  dzdesign design {arguments.output} --command-signal "-10..10 V x 0.12 + 1.5 V"',
-    )
+    of_both = ' --command-signal "-10..10 V x 0.12 + 1.5 V"' if len(valve.sides) > 1 else ""
+    return (*_written(valve, arguments), f"Next: dzdesign design {_word(os.fspath(arguments.output))}{of_both}")
+
+
+def _after_design(compensator: Any, arguments: Any) -> tuple[str, ...]:
+    return (*_written(compensator, arguments), f"Next: dzdesign codegen {_word(os.fspath(arguments.output))}")
 
 
 def _after_verify(verification: Any, arguments: Any) -> tuple[str, ...]:
@@ -169,12 +168,12 @@ RELAYS: Mapping[str, Relay] = {
             "dzdesign identify ramps/*.csv --config dzdesign.toml --plots plots",
             'dzdesign identify ramp.csv --dp "1 MPa" --columns "u=AO0:V, Q=Flow (L/min)"',
         ),
-        "terminal.tables:print_valve", _after_identify,
+        "terminal.brief:print_valve", _after_identify,
     ),
     "design": Relay(
         "stages.design:DesignArguments", "stages.design:design",
         ("dzdesign design valve.json", "dzdesign design valve.json --hysteresis play --target cortex-m4"),
-        "terminal.design_tables:print_design", _written,
+        "terminal.brief:print_design", _after_design,
     ),
     "verify": Relay(
         "stages.verify:VerifyArguments", "stages.verify:verify",

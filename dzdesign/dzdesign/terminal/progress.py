@@ -77,6 +77,11 @@ def lead_nowhere(stream: TextIO) -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
+def is_verbose() -> bool:
+    """Tell whether all details were asked for."""
+    return _Verbosity.verbose
+
+
 def is_watched() -> bool:
     """Tell whether a person sees stderr and wants to: a bar is drawn over itself, which a dumb terminal can't."""
     return sys.stderr.isatty() and not _Verbosity.quiet and not _Verbosity.verbose and os.environ.get("TERM") != "dumb"

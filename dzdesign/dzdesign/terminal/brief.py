@@ -1,0 +1,128 @@
+"""One screen for a valve and for a design: the result, what limits it, the warnings. ``-v`` has everything."""
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+from dzdesign.terminal import design_tables, tables
+from dzdesign.terminal.page import Column, new_console, put_line, put_rows
+from dzdesign.terminal.progress import is_verbose
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from dzdesign.core.recorded_units import RecordedUnits
+    from dzdesign.design.compensator import Compensator
+    from dzdesign.design.redesign import HysteresisChoice
+    from dzdesign.identify.valve.model import ValveModel, Warning_
+    from dzdesign.identify.valve.ramp_result import TestResult
+    from dzdesign.identify.valve.side_model import SideModel
+
+#: Characters of a warning beside its code, on a screen of 80.
+LONGEST_WARNING = 76
+MORE = "More: -v, and `dzdesign explain CODE`."
+
+
+def print_valve(valve: "ValveModel") -> None:
+    """Print the thresholds, the largest certified offset, what limits it, and each warning once."""
+    if is_verbose():
+        tables.print_valve(valve)
+        return
+    console = new_console()
+    for name, side in valve.sides.items():
+        _put_side(console, side, "" if len(valve.sides) == 1 else f", {name} side", valve.recorded_units.of_side(name))
+    put_line(console, tables.meter_line(valve.meter.floor_L_min, valve.meter.lag_in_words(), valve.recorded_units))
+    tables.put_units(console, valve.recorded_units, "valve.json")
+    _put_warnings(console, valve.warnings)
+
+
+def _put_side(console: "Console", side: "SideModel", which: str, units: "RecordedUnits") -> None:
+    betas = dict(zip((test.source for test in side.tests), side.beta.beta, strict=False))  # none without a known dP
+
+    def command(value: float | None) -> str:
+        return "-" if value is None else units.number(value, ".3f V")
+
+    columns: dict[str, Column[TestResult]] = {
+        f"dP ({units.label('MPa')})": lambda test: "?" if test.dp_MPa is None else units.number(test.dp_MPa, ".2f MPa"),
+        "ramps": lambda test: str(len(test.ramps)),
+        "opens": lambda test: command(test.u_knee_rising_V),
+        "closes": lambda test: command(test.u_knee_falling_V),
+        "bound": lambda test: command(test.u_guard_lower_V),
+        "beta": lambda test: f"{betas[test.source]:.4f}" if betas else "-",
+        f"Q max ({units.label('L/min')})": lambda test: units.number(test.q_max_L_min, ".1f L/min"),
+    }
+    put_rows(console, f"Thresholds ({units.label('V')}){which}", side.tests, columns, words=())
+    dp0 = side.reference.dp_MPa
+    at = "" if dp0 is None else f" at {units.text(dp0, '.2f MPa')}"
+    put_line(
+        console,
+        f"Certified offset at zero command: {units.text(side.curve.u_min0_V, '.3f V')}{at}, "
+        f"{100 * side.certificate.confidence:.6g} %. {tables.gains_most(side, units)}.",
+    )
+
+
+def print_design(compensator: "Compensator") -> None:
+    """Print what dead zone and hysteresis remain with each choice, what the certificate covers, and the warnings."""
+    from dzdesign.design.costs import design_warnings
+    from dzdesign.design.position_loop import in_words
+    from dzdesign.design.pressure_inputs import not_covered
+    from dzdesign.design.redesign import hysteresis_choices, without_sensors
+    from dzdesign.design.signals import SIDE_NAMES
+
+    if is_verbose():
+        design_tables.print_design(compensator)
+        return
+    console, units = new_console(), compensator.valve.recorded_units
+    for sign in compensator.signals.signs:
+        certificate = compensator.side(sign).certificate
+        low, high = (float(end) for end in certificate.dp_MPa)
+        which = "" if compensator.negative is None else f"{SIDE_NAMES[sign]}: "
+        put_line(
+            console,
+            f"{which}at zero command the output stays below the {100 * certificate.confidence:.6g} % bound of the "
+            f"{certificate.guard} threshold, {units.span(low, high, '.2f MPa')}, of {compensator.certified_of}.",
+        )
+    choices = hysteresis_choices(compensator)
+    if choices:
+        _put_choices(console, (without_sensors(compensator), *choices))
+    for line in in_words(compensator):
+        put_line(console, f"{line[:1].upper()}{line[1:]}.")
+    for line in not_covered(compensator):
+        put_line(console, f"not covered: {line}")
+    for line in design_warnings(compensator):
+        put_line(console, f"warning: {line}")
+    put_line(console, "More: -v, which also states the price of each choice.")
+
+
+def _put_choices(console: "Console", choices: "Sequence[HysteresisChoice]") -> None:
+    def share(value: float | None) -> str:
+        return "-" if value is None else f"{100 * value:.2f}"
+
+    columns: dict[str, Column[HysteresisChoice]] = {
+        "choice": lambda each: each.given + (f" ({judged})" if (judged := each.judged) else ""),
+        "dead zone": lambda each: share(each.onset),
+        "hysteresis": lambda each: share(each.hysteresis),
+    }
+    put_rows(console, "Left, % of command: largest dead zone on opening, mean hysteresis", choices, columns)
+    for each in choices:
+        if each.refused:
+            put_line(console, f"{each.given}: {each.refused}")
+        if each.possible:
+            put_line(console, f"{each.given}: {each.possible}.")
+
+
+def _put_warnings(console: "Console", warnings: "Iterable[Warning_]") -> None:
+    """Print a line for each code, with how often it was raised."""
+    counts: dict[str, int] = {}
+    first: dict[str, str] = {}
+    for each in warnings:
+        counts[each.code] = counts.get(each.code, 0) + 1
+        first.setdefault(each.code, f"{each.source}: {each.text}" if each.source else each.text)
+    for code, count in counts.items():
+        times = f" ({count})" if count > 1 else ""
+        put_line(console, _shortened(f"warning [{code}]{times} {first[code]}"))
+    if counts:
+        put_line(console, MORE)
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= LONGEST_WARNING else f"{text[:LONGEST_WARNING].rpartition(' ')[0]} ..."

@@ -1,0 +1,72 @@
+"""One screen: what identify and design print fits 80 columns and 24 lines; `explain` has the rest of a code."""
+
+from dataclasses import replace
+
+import pytest
+
+from dzdesign.command_line.cli import main
+from dzdesign.identify.data_quality.catalogue import catalogue
+from dzdesign.identify.valve.model import Warning_
+from dzdesign.terminal import brief
+from dzdesign.terminal.progress import reporting
+from dzdesign.verify import requirements
+from tests.support.designs import designed
+
+
+@pytest.fixture
+def screen(monkeypatch, capsys):
+    """What a terminal of 80 columns shows of a printer."""
+    from rich.console import Console
+
+    monkeypatch.setattr(brief, "new_console", lambda: Console(highlight=False, width=80, force_terminal=True, color_system=None))
+
+    def shown(printer, result):
+        printer(result)
+        return [line.rstrip() for line in capsys.readouterr().out.splitlines()]
+
+    return shown
+
+
+#: Lines that the command prints below: where it was written, and what comes next.
+BELOW = 2
+
+
+@pytest.mark.parametrize("sides", [1, 2])
+def test_a_valve_and_a_design_fit_one_screen(sides, example_valve, screen):
+    side = example_valve.positive
+    valve = example_valve if sides == 1 else replace(example_valve, sides={"positive": side, "negative": side})
+    made = designed(valve, **({} if sides == 1 else {"command_signal": "-10..10 V x 0.12 + 1.5 V"}))
+    for printer, result in ((brief.print_valve, valve), (brief.print_design, made)):
+        lines = screen(printer, result)
+        assert sides == 2 or len(lines) + BELOW <= 24, "\n".join(lines)
+        assert max(map(len, lines)) <= 80
+
+
+def test_a_warning_of_both_sides_stands_once(example_valve, screen):
+    warnings = example_valve.warnings + tuple(Warning_(code="few-repeats", text="a text " * 30, source=name) for name in ("a.csv", "b.csv"))
+    lines = screen(brief.print_valve, replace(example_valve, warnings=warnings))
+    (line,) = [each for each in lines if "few-repeats" in each]
+    assert "(2)" in line and line.endswith("...") and len(line) <= 80
+
+
+def test_verbose_prints_everything(example_valve, screen, capsys):
+    with reporting(quiet=False, verbose=True):
+        brief.print_valve(example_valve)
+        brief.print_design(designed(example_valve))
+    full = capsys.readouterr().out
+    assert "trend with dP" in full and "rounding and the beta table" in full
+
+
+@pytest.mark.parametrize("code", ["few-repeats", "[onset-hidden]", "over-compensation"])
+def test_a_code_is_explained(code, capsys):
+    assert main(["explain", code]) == 0
+    assert len(capsys.readouterr().out) > 40
+
+
+def test_every_code_has_an_explanation_without_a_link_and_another_is_refused(capsys):
+    known = [each.id for each in vars(requirements).values() if isinstance(each, requirements.Requirement)]
+    for code in (*catalogue(), *known):
+        assert main(["explain", code]) == 0
+        assert "](" not in capsys.readouterr().out, code
+    assert main(["explain", "onset-hiden"]) == 2
+    assert "did you mean 'onset-hidden'" in capsys.readouterr().err
