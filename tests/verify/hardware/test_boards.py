@@ -119,6 +119,22 @@ def test_a_project_that_ccs_builds_in_place_is_no_foreign_code(folder_of):
 
 
 @needs_compiler
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        ("--define=_FLASH --define=MINE", set()),
+        ("--define=MINE", {"hardware-compiles"}),
+        ("--define=_FLASH --define=DZ_BOARD_TRIP_GPIO=13", {"hardware-trip"}),
+    ],
+)
+def test_a_project_of_the_users_builds_what_was_verified(folder_of, options, named):
+    folder = folder_of("f280049c")
+    path = folder / "f280049c/dzdesign.projectspec"
+    path.write_text(path.read_text("utf-8").replace("--define=_FLASH", options), "utf-8")
+    assert found_in(folder).keys() == named
+
+
+@needs_compiler
 @pytest.mark.slow
 def test_code_of_the_user_runs_where_that_is_asked_for(folder_of):
     folder = folder_of("f280049c")

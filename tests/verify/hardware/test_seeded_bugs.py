@@ -45,8 +45,8 @@ def found_of(folder, target, form=ONE, edit=None, calibration="fixed", **board):
     (folder / BLOCK_FILE).write_bytes(made.block)
     values = read_board_values(texts[f"{target}/dz_board.h"])
     assert values is not None and board.keys() <= values.keys()
-    projects = (texts[f"{target}/{PROJECT_FILE}"], texts[f"{target}/{MAKEFILE}"])
-    built = Board(values={**values, **board}, projects=projects)
+    makefile, project = (texts[f"{target}/{name}"] for name in (MAKEFILE, PROJECT_FILE))
+    built = Board(values={**values, **board}, projects=(makefile, project, project))
     checks = hardware_checks(lambda: Bench(folder, made.manifest, compensator, built))
     return {check.id: check.text for check in checks if not check.holds}
 

@@ -74,15 +74,20 @@ def defines_of(options: str) -> dict[str, str]:
     return {name: value or "1" for name, value in DEFINE.findall(options)}
 
 
-def project_defines(project: str, makefile: str) -> dict[str, str]:
-    """Return what both projects of a target define to run from flash; if they differ it is a `RequirementError`."""
-    of_project, of_makefile = (defines_of(" ".join(FLASH_BUILD.findall(project))), defines_of(makefile))
-    if of_project != of_makefile:
+def project_defines(makefile: str, project: str, own: str) -> dict[str, str]:
+    """Return what the user's project file defines to run from flash: what both generated ones do, and more of his.
+
+    Else it is a `RequirementError`.
+    """
+    of_makefile = defines_of(makefile)
+    generated, of_own = (defines_of(" ".join(FLASH_BUILD.findall(text))) for text in (project, own))
+    if generated != of_makefile or of_makefile.items() - of_own.items():
+        there = of_own if generated == of_makefile else generated
         raise RequirementError(
-            f"to run from flash {PROJECT_FILE} defines {', '.join(of_project) or 'nothing'}, "
+            f"for FLASH {PROJECT_FILE} defines {', '.join(there) or 'nothing'}, "
             f"and {MAKEFILE} {', '.join(of_makefile) or 'nothing'}"
         )
-    return of_project
+    return of_own
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,8 +95,8 @@ class Board:
     """The user's part of a firmware, as far as it is compiled and run."""
 
     values: Mapping[str, int]
-    #: Texts of the project file and of the makefile.
-    projects: tuple[str, str]
+    #: Texts of the makefile, the generated project file and the user's.
+    projects: tuple[str, str, str]
     #: Names that the generated dz_board.h has, and the user's has not.
     lacking: tuple[str, ...] = ()
     #: The user's code to compile, by the generated file in whose place it stands.
@@ -115,11 +120,11 @@ def board_of(folder: Path, code: Path, manifest: FirmwareManifest, *, with_code:
     if made is None or values is None or (names and not with_code and code == folder):
         return None
     taken, project = names if with_code else [], f"{manifest.target}/{PROJECT_FILE}"
-    places = [(folder if project in changed else code) / project, code / manifest.target / MAKEFILE]
-    project_text, makefile = (path.read_text(encoding="utf-8", errors="replace") for path in places)
+    places = (code / manifest.target / MAKEFILE, code / project, (folder if project in changed else code) / project)
+    makefile, generated, own = (path.read_text(encoding="utf-8", errors="replace") for path in places)
     return Board(
         values=values,
-        projects=(project_text, makefile),
+        projects=(makefile, generated, own),
         lacking=tuple(sorted(made.keys() - values.keys())),
         code={code / name: (folder / name).resolve() for name in taken},
         taken=(*([header] if header in changed else []), *taken),

@@ -323,7 +323,7 @@ def _waits_for_trip(runs: HardwareRuns, gpio: int, words: str) -> str:
     )  # fmt: skip
     high, lost, late = (held.count_at(at_us) for at_us in (runs.happens_us, lost_us, lost_us + 1 + 1e6 * TRIP_S))
     early = _low(held, runs.bench.pins, 0, high, f"while {words} is low")
-    if found := early or _faults(held, 0, f"though {words} was low before the release only"):
+    if found := early or _faults(held, 0, f"after a start with {words} low"):
         return found
     if held.pin(runs.bench.pins[0]).level_at(lost) != HIGH:
         return f"GPIO{runs.bench.pins[0]} is not driven after {words} went high"
