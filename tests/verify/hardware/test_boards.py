@@ -70,7 +70,7 @@ HOLD = {
 }
 WRONG = {
     "channels swapped": ("f28335, declared", {"PRESSURE_A": 0, "PRESSURE_B": 15}, "channels"),
-    "a channel that is not declared": ("f280049c", {"COMMAND": 7}, "channels"),
+    "a channel that is not declared": ("f280049c", {"COMMAND": 6}, "channels"),
     "another crystal": ("f28335", {"OSC_HZ": 60_000_000, "PLL_DIV": 5}, "pwm"),
     "a PLL that does not fit": ("f28335", {"PLL_DIV": 9}, "compiles"),
     "a pin of another module": ("f280049c", {"PWM_GPIO": 2}, "compiles"),
@@ -148,6 +148,11 @@ def test_code_of_the_user_runs_where_that_is_asked_for(folder_of):
     )
     assert found_in(folder) == {}, "of code that is not run nothing is known"
     assert {"hardware-trip", "hardware-start"} <= found_in(folder, with_code=True).keys()
+    (folder / "board/other.c").write_text(
+        '#include "driverlib.h"\nvoid other(void)\n{\n    static unsigned long turns;\n'
+        "    if (++turns == 8000u) { EPWM_forceTripZoneEvent(EPWM1_BASE, 4u); }\n}\n"
+    )
+    assert found_in(folder, with_code=True).keys() == {"hardware-channels"}, "only after a second"
     (folder / "board/other.c").write_text("void other(void) { for (;;) { } }\n")
     assert "did not end" in found_in(folder, with_code=True)["hardware-pwm"]
 

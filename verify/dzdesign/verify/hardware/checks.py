@@ -22,6 +22,8 @@ from dzdesign.verify.requirements import Check, Requirement
 TRIP_S, SAMPLE_LOSS_S = 1e-6, 5e-3
 #: For so long an output must stay low that nothing may release.
 STAYS_LOW_US = 12_000.0
+#: For so long more a firmware is followed with code of the user's, which may do something of its own then.
+LATER_US = 2e6
 #: Bits of the faults, as dz_hardware.h states them.
 NO_SAMPLE, TRIP_INPUT, WATCHDOG, CLOCK, NO_CURRENT = 1, 2, 4, 8, 16
 #: PWM periods of each compare value that is written.
@@ -135,7 +137,8 @@ class HardwareRuns:
         steps = [step for at_us, codes in self.followed for step in self.codes(at_us, codes)]
         driven_us = self.followed[2][0] + self.sample_us
         steps += [*self.coil(), *self.supply(), *load_begins(self.bench, driven_us)]
-        return self.bench.run(steps, self.followed[-1][0] + self.set_us)
+        later_us = LATER_US if self.bench.runs_user_code else 0.0
+        return self.bench.run(steps, self.followed[-1][0] + self.set_us + later_us)
 
     @cached_property
     def written(self) -> list[tuple[float, int, int]]:
@@ -237,12 +240,13 @@ def _switches(runs: HardwareRuns) -> str:
         if shortest * signals.tick_Hz != trace.clock_Hz:
             return f"GPIO{gpio} switches at {trace.clock_Hz / shortest:.1f} Hz {clock}, expected {signals.tick_Hz} Hz"
     period, interrupts, frames = runs.period(trace), trace.times("interrupt"), runs.frames(trace)
+    pins = [(gpio, trace.pin(gpio)) for gpio in runs.bench.pins]
     for at, frame in zip(interrupts, frames, strict=True):
         given = [each[1:] for each in runs.written if trace.count_at(each[0]) <= at]
         if not given or frame + period > trace.end:
             continue
-        for gpio, value in zip(runs.bench.pins, given[-1], strict=False):
-            high = trace.pin(gpio).high_counts(frame, frame + period)
+        for (gpio, pin), value in zip(pins, given[-1], strict=False):
+            high = pin.high_counts(frame, frame + period)
             if high != min(value * period // signals.compare_max, period):
                 return f"GPIO{gpio} is high for {high} of {period} counts at compare value {value}"
     return ""
@@ -278,9 +282,10 @@ def _reaches(runs: HardwareRuns) -> str:
         used = role in INPUTS or (runs.drive and (role == "CURRENT" or runs.drive.loop.supply))
         if used and channel not in held:
             return f"{runs.bench.names[role]}, declared for the {role.lower().replace('_', ' ')}, is never converted"
+    pins = [(gpio, trace.pin(gpio)) for gpio in runs.bench.pins]
     for frame, due in zip(runs.frames(trace), runs.due, strict=True):
-        for gpio, compare in zip(runs.bench.pins, due.compares, strict=False):
-            high = trace.pin(gpio).high_counts(frame, frame + period)
+        for (gpio, pin), compare in zip(pins, due.compares, strict=False):
+            high = pin.high_counts(frame, frame + period)
             if frame + period <= trace.end and high != compare:
                 given = runs.channel_words(due.codes)
                 return f"with codes {given}, GPIO{gpio} is high for {high} of {period} counts, expected {compare}"
@@ -404,8 +409,9 @@ def _at_its_rate(runs: HardwareRuns) -> str:
 def _never_both(runs: HardwareRuns) -> str:
     one, other = runs.bench.pins
     for trace in (runs.following, runs.writing):
-        for at in sorted({*trace.pin(one).times, *trace.pin(other).times}):
-            if trace.pin(one).level_at(at) != LOW and trace.pin(other).level_at(at) != LOW:
+        first, second = trace.pin(one), trace.pin(other)
+        for at in sorted({*first.times, *second.times}):
+            if first.level_at(at) != LOW and second.level_at(at) != LOW:
                 return f"GPIO{one} and GPIO{other} are high at once, {trace.ms_of(at):.2f} ms after the start"
     return ""
 

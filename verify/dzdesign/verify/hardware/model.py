@@ -194,6 +194,11 @@ class Bench:
         self._build(code, project_defines(*board.projects))
 
     @property
+    def runs_user_code(self) -> bool:
+        """Whether code of the user's is compiled in."""
+        return bool(self._user)
+
+    @property
     def pins(self) -> list[int]:
         """GPIO of each output."""
         return [self.board["PWM_GPIO"], *([self.board["PWM_B_GPIO"]] if self.two else [])]
