@@ -216,7 +216,7 @@ def _low(trace: Trace, pins: Sequence[int], begin: int, end: int, when: str) -> 
     for gpio in pins:
         at = trace.pin(gpio).not_low_from(begin, end)
         if at is not None:
-            level = "high" if trace.pin(gpio).level_at(at) == HIGH else "not driven"
+            level = "high" if trace.pin(gpio).level_at(at) in (LOW, HIGH) else "not driven"  # it may be so for no time
             return f"GPIO{gpio} is {level} {when}, {trace.ms_of(at):.2f} ms after the start"
     return ""
 
