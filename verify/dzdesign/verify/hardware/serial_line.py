@@ -16,7 +16,7 @@ RELEASED = 0x0080
 #: Nominal bits per second, what a receiver bears, and the bits of an octet.
 BAUD, BAUD_ERROR, OCTET_BITS = 115_200, 0.02, 10
 #: Begins a load; a reply says so with a bit more. Reasons to refuse it: the drive moves, the command is not zero.
-REQUEST_BEGINS, REPLY_BEGINS, REFUSED = b"\xc3\x3c\x01\x01", b"\xc3\x3c\x81\x01", (5, 6)
+REQUEST_BEGINS, REPLY_BEGINS, REFUSED = b"\xc3\x3c\x01\x01", b"\xc3\x3c\x81\x01", {5, 6}
 REASON_AT = 5
 
 
@@ -39,17 +39,18 @@ def load_begins(bench: Bench, at_us: float) -> list[Step]:
 
 def line_fault(bench: Bench, trace: Trace, due: list[Due]) -> str:
     """Return what is wrong on the line of a run, with what was due at each interrupt, or nothing."""
-    gpio, sent = bench.board["SCI_TX_GPIO"], [each for each in trace.events if each.word == "octet"]
-    if {each.one for each in sent} != {gpio}:
+    gpio = bench.board["SCI_TX_GPIO"]
+    sent, paces = ([each.two for each in trace.events if each[1:3] == (word, gpio)] for word in ("octet", "pace"))
+    if not sent:
         return f"the telemetry does not leave on GPIO{gpio}"
-    for each in (each for each in trace.events if each.word == "pace"):
-        baud = OCTET_BITS * trace.clock_Hz / each.two
+    for pace in paces:
+        baud = OCTET_BITS * trace.clock_Hz / pace
         if abs(baud / BAUD - 1) > BAUD_ERROR:
             return f"an octet takes as long as {OCTET_BITS} bits at {baud:.0f} bit/s, expected {BAUD} bit/s"
-    octets = bytes(each.two for each in sent)
+    octets = bytes(sent)
     if bench.block:
         reply = octets.find(REPLY_BEGINS)
-        if reply < 0 or octets[reply + REASON_AT] not in REFUSED:
+        if reply < 0 or not set(octets[reply + REASON_AT : reply + REASON_AT + 1]) & REFUSED:
             return "a calibration block is not refused while the valve is driven"
     laws = {sign: ExactLaw(bench.compensator, sign) for sign in bench.compensator.signals.signs}
     frames, at = 0, octets.find(FRAME_BEGINS)
