@@ -65,7 +65,7 @@ def test_a_folder_of_a_declared_board_is_designed_and_generated_again(example_va
 
 
 REFUSED = [
-    ("f28335", {"crystal": "10 MHz"}, "can't be clocked"),
+    ("f28335", {"crystal": "8 MHz"}, "its frequency in MHz must lie from 12 to 150, got 8"),
     ("f28335", {"crystal": "33.333 MHz"}, "can't be clocked"),
     ("f28335", {"crystal": "20"}, "without a unit"),
     ("f28335", {"channels": "A0 A1"}, "expected the channels"),
@@ -74,6 +74,7 @@ REFUSED = [
     ("f28335", {"channels": "A0 A1 A2 A3"}, "expected 3 of these inputs"),
     ("f280049c", {"crystal": "20 MHz"}, "device.h"),
     ("f280049c", {"channels": "A0 A1 B2"}, "has no channel 'B2'"),
+    ("f280049c", {"channels": "A0 A1 A7"}, "has no channel 'A7'"),
     ("host", {"channels": "A0 A1 A2"}, "target host has none"),
 ]
 
@@ -96,6 +97,7 @@ IMPOSSIBLE = [
     ("f280049c", "PWM=9", "PWM must be 1 to 8"),
     ("f280049c", "WINDOW=4", "WINDOW"),
     ("f280049c", "PRESSURE_A=2", "same channel"),
+    ("f280049c", "COMMAND=11", "no pin"),
     ("f280049c", "TRIP_GPIO=24", "boot pins"),
     ("f280049c", "TRIP_GPIO=0", "pin of the PWM"),
 ]

@@ -40,7 +40,7 @@ def c2000_target(
     context: Mapping[str, str],
     *,
     converter: Converter,
-    known_channels: Sequence[str],
+    known_channels: Mapping[str, int],
     channels: Sequence[str] = (),
     crystal_hz: int | None = None,
     sources: tuple[str, ...] = (),
@@ -51,7 +51,7 @@ def c2000_target(
     """Return the target whose figures, printed, are `context`.
 
     `sources` is the C that only it has, `block_sources` what it has besides in block form. For `channels` and
-    `crystal_hz` see `Target.on_board`; the numbers of channels are their places in `known_channels`.
+    `crystal_hz` see `Target.on_board`; `known_channels` has the number of each channel that is a pin.
     """
     own = (*OF_THE_DEVICE, *OF_BOTH[:3], *sources)
     templates = {file: f"{file}.jinja" for file in (*own, "README.md")}
@@ -81,16 +81,16 @@ def c2000_target(
     )
 
 
-def _channels(name: str, known: Sequence[str], declared: Sequence[str]) -> dict[str, str]:
+def _channels(name: str, known: Mapping[str, int], declared: Sequence[str]) -> dict[str, str]:
     """Return name and number of the channel of each role, printed; of those that are not declared one that is free."""
     for channel in declared:
         if channel not in known:
             hint = nearest(channel, known)
-            raise InputError(f"--channels: {name} has no channel '{channel}'{hint}; it has {known[0]} to {known[-1]}")
+            raise InputError(f"--channels: {name} has no channel '{channel}'{hint}; it has {', '.join(known)}")
     free = [channel for channel in (*ROLES.values(), *known) if channel not in declared]
     of_roles = dict(zip(ROLES, (*declared, *(free if declared else ROLES.values())), strict=False))
     names = {f"{role}_channel": f"ADCIN{channel}" for role, channel in of_roles.items()}
-    return names | {f"{role}_number": str(known.index(channel)) for role, channel in of_roles.items()}
+    return names | {f"{role}_number": str(known[channel]) for role, channel in of_roles.items()}
 
 
 def exact(quantity: Fraction, what: str, largest: int) -> int:

@@ -87,7 +87,9 @@ def _differences(earlier: Compensator, compensator: Compensator) -> Iterator[str
     texts, ours = earlier.options or {}, compensator.options or {}
     options = [name for name in {**texts, **ours} if texts.get(name) != ours.get(name)]
     for name in options:
-        yield f"{flag_of(name)} {quoted(texts.get(name, ''))}, here {quoted(ours.get(name, ''))}"
+        flag = flag_of(name)
+        given = [f"with {flag} {quoted(each[name])}" if each.get(name) else f"without {flag}" for each in (texts, ours)]
+        yield f"it was designed {given[0]}, this one {given[1]}"
     if options:
         return  # from which other numbers follow
     for field in fields(Compensator):

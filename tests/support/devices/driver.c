@@ -42,9 +42,6 @@ static void run(const char *events)
                dz_state.ticks_without_sample, dz_state.released, dz_state.fault, tick.held, tick.begins, falls,
                tick.duty_b, (unsigned)pwms[1].compare[0], pwms[1].tripped ? 1u : 0u, device_drive_samples,
                device_drive_ticks);
-#ifdef F28335
-        printf(" free_soft=%u free_soft_b=%u", EPwm1Regs.TBCTL.bit.FREE_SOFT, EPwm2Regs.TBCTL.bit.FREE_SOFT);
-#endif
 #ifdef DZ_FAULT_CALIBRATION
         printf(" calibration=%u", dz_state.calibration);
 #endif

@@ -70,7 +70,7 @@ HOLD = {
 }
 WRONG = {
     "channels swapped": ("f28335, declared", {"PRESSURE_A": 0, "PRESSURE_B": 15}, "channels"),
-    "a channel that is not declared": ("f280049c", {"COMMAND": 7}, "channels"),
+    "a channel that is not declared": ("f280049c", {"COMMAND": 6}, "channels"),
     "another crystal": ("f28335", {"OSC_HZ": 60_000_000, "PLL_DIV": 5}, "pwm"),
     "a PLL that does not fit": ("f28335", {"PLL_DIV": 9}, "compiles"),
     "a pin of another module": ("f280049c", {"PWM_GPIO": 2}, "compiles"),
@@ -119,6 +119,22 @@ def test_a_project_that_ccs_builds_in_place_is_no_foreign_code(folder_of):
 
 
 @needs_compiler
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        ("--define=_FLASH --define=MINE", set()),
+        ("--define=MINE", {"hardware-compiles"}),
+        ("--define=_FLASH --define=DZ_BOARD_TRIP_GPIO=13", {"hardware-trip"}),
+    ],
+)
+def test_a_project_of_the_users_builds_what_was_verified(folder_of, options, named):
+    folder = folder_of("f280049c")
+    path = folder / "f280049c/dzdesign.projectspec"
+    path.write_text(path.read_text("utf-8").replace("--define=_FLASH", options), "utf-8")
+    assert found_in(folder).keys() == named
+
+
+@needs_compiler
 @pytest.mark.slow
 def test_code_of_the_user_runs_where_that_is_asked_for(folder_of):
     folder = folder_of("f280049c")
@@ -132,6 +148,11 @@ def test_code_of_the_user_runs_where_that_is_asked_for(folder_of):
     )
     assert found_in(folder) == {}, "of code that is not run nothing is known"
     assert {"hardware-trip", "hardware-start"} <= found_in(folder, with_code=True).keys()
+    (folder / "board/other.c").write_text(
+        '#include "driverlib.h"\nvoid other(void)\n{\n    static unsigned long turns;\n'
+        "    if (++turns == 8000u) { EPWM_forceTripZoneEvent(EPWM1_BASE, 4u); }\n}\n"
+    )
+    assert found_in(folder, with_code=True).keys() == {"hardware-channels"}, "only after a second"
     (folder / "board/other.c").write_text("void other(void) { for (;;) { } }\n")
     assert "did not end" in found_in(folder, with_code=True)["hardware-pwm"]
 

@@ -7,8 +7,9 @@ import pytest
 
 from dzdesign.codegen.project import generate, target_named
 from dzdesign.design.designing import design
+from dzdesign.design.firmware_manifest import BLOCK_FILE
 from dzdesign.design.signals import Signals
-from dzdesign.verify.hardware.board_values import Board, read_board_values
+from dzdesign.verify.hardware.board_values import MAKEFILE, PROJECT_FILE, Board, read_board_values
 from dzdesign.verify.hardware.checks import hardware_checks
 from dzdesign.verify.hardware.model import Bench
 from tests.support.core_variants import BOTH
@@ -17,8 +18,9 @@ from tests.support.golden_firmware import FULL, full_options, golden_compensator
 from tests.support.synthetic import needs_compiler
 
 pytestmark = needs_compiler
-ONE, TWO, (CURRENT, SUPPLY) = "one solenoid", "two solenoids", SENSORS
-HARDWARE, MAIN, ISR = "dz_hardware.c", "main.c", "dz_isr.c"
+ONE, BLOCK, TWO, (CURRENT, SUPPLY) = "one solenoid", "block form", "two solenoids", SENSORS
+HARDWARE, MAIN, ISR, TELEMETRY = "dz_hardware.c", "main.c", "dz_isr.c", "dz_telemetry.c"
+PROJECTS = f"{PROJECT_FILE} {MAKEFILE}"
 
 
 def compensator_of(target, form):
@@ -27,7 +29,7 @@ def compensator_of(target, form):
         signals = Signals(command=BOTH, compare_max=target_named(target).compare_max)
         return design(golden_valve(FULL), full_options(signals=signals, negative_dp="wired"))
     made = golden_compensator(target)
-    return made if form == ONE else with_current(made, target_named(target), SENSORS[form])
+    return made if form in (ONE, BLOCK) else with_current(made, target_named(target), SENSORS[form])
 
 
 def found_of(folder, target, form=ONE, edit=None, calibration="fixed", **board):
@@ -35,15 +37,18 @@ def found_of(folder, target, form=ONE, edit=None, calibration="fixed", **board):
     compensator = compensator_of(target, form)
     made = generate(compensator, target, calibration)
     texts = dict(made.files)
-    for file, old, new in [edit] if edit else []:
-        name = f"{target}/{file}"
+    files, old, new = edit or ("", "", "")
+    for name in (f"{target}/{file}" for file in files.split()):
         assert old in texts[name], f"{old!r} is not in {name}"
         texts[name] = texts[name].replace(old, new)
     write(folder, texts)
+    (folder / BLOCK_FILE).write_bytes(made.block)
     values = read_board_values(texts[f"{target}/dz_board.h"])
     assert values is not None and board.keys() <= values.keys()
-    bench = lambda: Bench(folder, made.manifest, compensator, Board(values={**values, **board}))  # noqa: E731
-    return {check.id: check.text for check in hardware_checks(bench) if not check.holds}
+    makefile, project = (texts[f"{target}/{name}"] for name in (MAKEFILE, PROJECT_FILE))
+    built = Board(values={**values, **board}, projects=(makefile, project, project))
+    checks = hardware_checks(lambda: Bench(folder, made.manifest, compensator, built))
+    return {check.id: check.text for check in checks if not check.holds}
 
 
 #: Form, file, what stands there, what somebody wrote instead, and the requirement that names it.
@@ -80,8 +85,32 @@ BUGS = {
                               "rates"),
         "not acknowledged": (ONE, HARDWARE, "PieCtrlRegs.PIEACK.all = PIEACK_GROUP3;", "", "rates"),
         "samples too often": (ONE, HARDWARE, "SOCAPRD = ET_2ND", "SOCAPRD = ET_1ST", "rates"),
-        "telemetry on no pin": (ONE, "dz_telemetry.c", "DZ_SCI_MUX.bit.DZ_SCI_TX = DZ_SCI_FUNCTION",
-                                "DZ_SCI_MUX.bit.DZ_SCI_TX = 0u", "rates"),
+        "telemetry on no pin": (ONE, TELEMETRY, "DZ_SCI_MUX.bit.DZ_SCI_TX = DZ_SCI_FUNCTION",
+                                "DZ_SCI_MUX.bit.DZ_SCI_TX = 0u", "telemetry"),
+        "another fault": (ONE, ISR, "|= DZ_FAULT_TRIP_INPUT", "|= DZ_FAULT_CLOCK", "trip"),
+        "faults exchanged": (ONE, "dz_hardware.h", "DZ_FAULT_WATCHDOG 0x0004u", "DZ_FAULT_WATCHDOG 0x0008u", "start"),
+        "fault of the current": (CURRENT, ISR, "|= DZ_FAULT_NO_CURRENT", "|= DZ_FAULT_CURRENT", "sample-loss"),
+        "released with the trip input low": (ONE, ISR, "(dz_trip_inputs_high() != 0u)", "(fresh != 0u)", "trip"),
+        "pull-up at the PWM's pin": (ONE, HARDWARE, "GPAPUD.bit.DZ_PWM_PIN = 1u", "GPAPUD.bit.DZ_PWM_PIN = 0u",
+                                     "start"),
+        "trip needs a clock": (ONE, HARDWARE, "DZ_TRIP_QUALIFIER.bit.DZ_TRIP_PIN = 3u",
+                               "DZ_TRIP_QUALIFIER.bit.DZ_TRIP_PIN = 0u", "trip"),
+        "pins before the trip zone": (ONE, HARDWARE, "dz_output_hold_low(void)\n{",
+                                      "dz_output_hold_low(void)\n{\n    dz_hardware_init();", "start"),
+        "other groups acknowledged": (ONE, HARDWARE, "PIEACK.all = PIEACK_GROUP3", "PIEACK.bit.ACK3 = 1u", "rates"),
+        "high at a halt": (ONE, HARDWARE, "FREE_SOFT = DZ_STOP_AT_PERIOD", "FREE_SOFT = 0u", "halt"),
+        "runs on at a halt": (TWO, HARDWARE, "DZ_PWM_B.TBCTL.bit.FREE_SOFT = DZ_STOP_AT_PERIOD",
+                              "DZ_PWM_B.TBCTL.bit.FREE_SOFT = 2u", "halt"),
+        "frame with B for A": (ONE, TELEMETRY, "frame.p_a_adc = state.p_a_adc", "frame.p_a_adc = state.p_b_adc",
+                               "telemetry"),
+        "compare values exchanged": (TWO, TELEMETRY, "frame.compare_b = state.compare_b",
+                                     "frame.compare_b = state.compare_a", "telemetry"),
+        "baud registers exchanged": (ONE, TELEMETRY, "DZ_SCI_BRR >> 8;\n    DZ_SCI.SCILBAUD = DZ_SCI_BRR & 0xFFu",
+                                     "DZ_SCI_BRR & 0xFFu;\n    DZ_SCI.SCILBAUD = DZ_SCI_BRR >> 8", "telemetry"),
+        "one baud off": (ONE, "dz_telemetry.h", "DZ_SCI_BRR 80u", "DZ_SCI_BRR 78u", "telemetry"),
+        "block taken under command": (BLOCK, "dz_active.c", "return reason;", "return 0u * reason;", "telemetry"),
+        "flash not defined": (ONE, PROJECT_FILE, "--define=_FLASH", "", "compiles"),
+        "flash defined by no project": (ONE, PROJECTS, "--define=_FLASH", "", "rates"),
         "both solenoids": (TWO, HARDWARE, "DZ_PWM_B.CMPA.half.CMPA = compare;\n    DZ_PWM_B.AQCSFRC",
                            "DZ_PWM_B.CMPA.half.CMPA = compare + 9u;\n    if (compare) DZ_PWM_B.AQCSFRC", "solenoids"),
         "B for A": (TWO, ISR, "dz_write_compare_b(drive.compare_b)", "dz_write_compare_b(drive.compare_a)",
@@ -112,6 +141,13 @@ BUGS = {
         "enumerations swapped": (ONE, HARDWARE, "EPWM_TZ_ACTION_EVENT_TZA, EPWM_TZ_ACTION_LOW",
                                  "EPWM_TZ_ACTION_LOW, EPWM_TZ_ACTION_EVENT_TZA", "compiles"),
         "B not tripped": (TWO, HARDWARE, "EPWM_enableTripZoneSignals(DZ_PWM_B, EPWM_TZ_SIGNAL_OSHT1);", "", "trip"),
+        "another fault": (ONE, ISR, "|= DZ_FAULT_NO_SAMPLE", "|= DZ_FAULT_CLOCK", "sample-loss"),
+        "trip needs a clock": (ONE, HARDWARE, "GPIO_QUAL_ASYNC", "GPIO_QUAL_SYNC", "trip"),
+        "pins before the trip zone": (TWO, HARDWARE, "dz_output_hold_low(void)\n{",
+                                      "dz_output_hold_low(void)\n{\n    dz_hardware_init();", "start"),
+        "flash defined by no project": (ONE, PROJECTS, "--define=_FLASH", "", "rates"),
+        "a project's own board": (ONE, PROJECTS, "--define=_FLASH", "--define=_FLASH --define=DZ_BOARD_TRIP_GPIO=13",
+                                  "trip"),
         "current without its own flag": (CURRENT, HARDWARE, "        clear_flag(ADC_INT_NUMBER2);", "", "sample-loss"),
     },
 }  # fmt: skip
@@ -120,7 +156,7 @@ BUGS = {
 @pytest.mark.parametrize(("target", "bug"), [(target, bug) for target in BUGS for bug in BUGS[target]])
 def test_a_bug_is_found_by_the_requirement_that_names_it(tmp_path, target, bug):
     form, *edit, named = BUGS[target][bug]
-    found = found_of(tmp_path, target, form, tuple(edit))
+    found = found_of(tmp_path, target, form, tuple(edit), "block" if form == BLOCK else "fixed")
     print(found)
     assert f"hardware-{named}" in found
 

@@ -182,12 +182,19 @@ HARDWARE_RATES = Requirement(id="hardware-rates", title="interrupts and samples 
 HARDWARE_SOLENOIDS = Requirement(
     id="hardware-solenoids", title="only one of the two solenoids is driven at a time", how=ON_DEVICE
 )
+HARDWARE_HALT = Requirement(
+    id="hardware-halt", title="the output goes low when a debugger halts the processor", how=ON_DEVICE
+)
+HARDWARE_TELEMETRY = Requirement(
+    id="hardware-telemetry", title="the telemetry says what the firmware does, on its line", how=ON_DEVICE
+)
 HARDWARE_CURRENT = Requirement(
     id="hardware-current", title="the current is sampled on its channel at its times", how=ON_DEVICE
 )
 OF_HARDWARE = (
     HARDWARE_COMPILES, HARDWARE_PWM, HARDWARE_START, HARDWARE_CHANNELS, HARDWARE_TRIP, HARDWARE_SAMPLE_LOSS,
-    HARDWARE_WATCHDOG, HARDWARE_RATES, HARDWARE_SOLENOIDS, HARDWARE_CURRENT,
+    HARDWARE_WATCHDOG, HARDWARE_RATES, HARDWARE_SOLENOIDS, HARDWARE_HALT, HARDWARE_TELEMETRY,
+    HARDWARE_CURRENT,
 )  # fmt: skip
 BOARD_CODE = Requirement(
     id="board-code", title="your board code runs on the device's model", how="`verify --board-code`"

@@ -33,7 +33,8 @@ WINDOW_SYSCLKS, WINDOW_MAX_SYSCLKS = 50, 512  # ADC_setupSOC()
 WINDOW_LEAST_S = Fraction(75, 10**9)
 CONVERSION_ADCCLKS = 12  # one more than the 10.5 of 12 bits, rounded up
 WATCHDOG_HZ = 10_000_000  # INTOSC1
-CHANNEL_NAMES = [f"A{number}" for number in range(16)]  # ADC_CH_ADCINn of ADC A
+#: ADC_CH_ADCINn of ADC A that is a pin of the package with 100: SPRS945G, "Analog Signals".
+CHANNELS_OF_PINS = {f"A{number}": number for number in (*range(7), 8, 9, 10)}
 PWM_MODULES = 8
 ADC_SPAN_V = Fraction(33, 10)
 # SPRS945G, table of the ADC's characteristics: largest offset error; largest gain error with the internal reference,
@@ -73,6 +74,7 @@ def converter() -> dict[str, str]:
         "window_least": str(ceil(max(WINDOW_LEAST_S, 1 / adcclk_hz) * SYSCLK_HZ)),
         "window_most": str(int(longest_s * SYSCLK_HZ)),
         "pwm_modules": str(PWM_MODULES),
+        "channels_of_pins": f"0x{sum(1 << number for number in CHANNELS_OF_PINS.values()):04X}",
         **current,
         "current_held_us": printed(window_s * 10**6),
         "current_timeout_ticks": "2",  # a flag comes with the last of eight codes
@@ -115,7 +117,7 @@ def on_board(crystal_hz: int | None = None, channels: Sequence[str] = ()) -> Tar
         "f280049c",
         "TI TMS320F280049C at 100 MHz: DriverLib, ePWM1 at 2.5 kHz, ADC at 1.25 kHz, CCS project and makefile",
         {**timing(), **converter(), **PROJECT},
-        known_channels=CHANNEL_NAMES,
+        known_channels=CHANNELS_OF_PINS,
         channels=channels,
         converter=Converter(
             full_V=ADC_SPAN_V,

@@ -31,7 +31,8 @@ from dzdesign.design.drive_functions import RAMP_UNIT
 from dzdesign.design.target_inputs import Converter
 
 CRYSTAL_HZ = 30_000_000  # where no other is declared
-CRYSTAL_LEAST_HZ, CRYSTAL_MOST_HZ = 4_000_000, 150_000_000  # of an oscillator at X1
+# Of an oscillator at X1; below, the clock is too slow to make a frame of telemetry in a quarter of a PWM period.
+CRYSTAL_LEAST_HZ, CRYSTAL_MOST_HZ = 12_000_000, 150_000_000
 PLL_DIV_MAX, PLL_DIVSEL = 10, 2  # SYSCLKOUT = crystal * DIV / DIVSEL
 SYSCLKOUT_MAX_HZ = 150_000_000
 ADCCLKPS, ACQ_PS = 1, 15
@@ -39,7 +40,7 @@ ADCCLK_MAX_HZ = 25_000_000
 # SPRS439, sequential sampling mode: from the trigger to the sample window, and to the first result after it; ADCCLKs.
 ADC_TRIGGER_ADCCLKS, ADC_RESULT_ADCCLKS = Fraction(5, 2), 4
 ADC_SPAN_V = 3
-CHANNEL_NAMES = [f"{half}{number}" for half in "AB" for number in range(8)]  # in the order of CONVnn of ADCCHSELSEQn
+CHANNELS_OF_PINS = {f"{half}{number}": at + number for half, at in (("A", 0), ("B", 8)) for number in range(8)}
 LOSPCP, LSPCLK_MAX_HZ = 1, 75_000_000
 LINK = Link(tick_Hz=PWM_HZ, frame_ticks=25, baud=115_200)  # section 4.1 of the paper records at 100 Hz
 FIFO_OCTETS = 16
@@ -83,7 +84,8 @@ def pll_div(crystal_hz: int) -> int:
 
 def sysclkout(crystal_hz: int) -> Fraction:
     """Return the clock of processor and ePWM, Hz."""
-    within(Fraction(crystal_hz), CRYSTAL_LEAST_HZ, CRYSTAL_MOST_HZ, "the crystal in Hz")
+    least, most = (Fraction(limit_hz, 10**6) for limit_hz in (CRYSTAL_LEAST_HZ, CRYSTAL_MOST_HZ))
+    within(Fraction(crystal_hz, 10**6), least, most, "its frequency in MHz")
     return Fraction(crystal_hz * pll_div(crystal_hz), PLL_DIVSEL)
 
 
@@ -232,7 +234,7 @@ def on_board(declared_hz: int | None = None, channels: Sequence[str] = ()) -> Ta
         "TI TMS320F28335 at 150 MHz: ePWM1 at 2.5 kHz, ADC at 1.25 kHz, CCS project and makefile",
         {**figures, **frame_context(), **PROJECT},
         converter=Converter(full_V=Fraction(ADC_SPAN_V), levels=2**ADC_BITS),
-        known_channels=CHANNEL_NAMES,
+        known_channels=CHANNELS_OF_PINS,
         channels=channels,
         crystal_hz=declared_hz,
         sources=("dz_telemetry.c", "dz_telemetry.h", "dz_frame.c", "dz_frame.h"),

@@ -5,11 +5,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from dzdesign.core.errors import quoted
+from dzdesign.core.errors import RequirementError, quoted
 from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.verify.folder import changed_board_files, user_files
 
 BOARD_FILE = "dz_board.h"
+#: What builds a target's firmware to run from flash, in one way or the other.
+PROJECT_FILE, MAKEFILE = "dzdesign.projectspec", "Makefile"
 #: Characters of a line that are shown.
 SHOWN = 60
 
@@ -17,6 +19,8 @@ COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL)
 VALUE = re.compile(
     r"\s*#ifndef (DZ_BOARD_\w+)\s*\n\s*#define \1\s+\(?(0[xX][0-9a-fA-F]+|\d+)[uU]?[lL]{0,2}\)?\s*\n\s*#endif", re.ASCII
 )
+DEFINE = re.compile(r"--define=(\w+)(?:=(\w+))?")
+FLASH_BUILD = re.compile(r'<configuration name="FLASH" compilerBuildOptions="([^"]*)"')
 WHOLE = re.compile(r"\s*#ifndef DZ_BOARD_H\s*\n\s*#define DZ_BOARD_H\s*\n(.*)#endif\s*", re.ASCII | re.DOTALL)
 
 
@@ -59,11 +63,40 @@ def beside_values(text: str) -> str:
     return "its first lines"
 
 
+def defines_of(options: str) -> dict[str, str]:
+    """Return what options of TI's compiler define.
+
+    Examples
+    --------
+    >>> defines_of("-O2 --define=_FLASH --define=LARGE_MODEL=1")
+    {'_FLASH': '1', 'LARGE_MODEL': '1'}
+    """
+    return {name: value or "1" for name, value in DEFINE.findall(options)}
+
+
+def project_defines(makefile: str, project: str, own: str) -> dict[str, str]:
+    """Return what the user's project file defines to run from flash: what both generated ones do, and more of his.
+
+    Else it is a `RequirementError`.
+    """
+    of_makefile = defines_of(makefile)
+    generated, of_own = (defines_of(" ".join(FLASH_BUILD.findall(text))) for text in (project, own))
+    if generated != of_makefile or of_makefile.items() - of_own.items():
+        there = of_own if generated == of_makefile else generated
+        raise RequirementError(
+            f"for FLASH {PROJECT_FILE} defines {', '.join(there) or 'nothing'}, "
+            f"and {MAKEFILE} {', '.join(of_makefile) or 'nothing'}"
+        )
+    return of_own
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Board:
     """The user's part of a firmware, as far as it is compiled and run."""
 
     values: Mapping[str, int]
+    #: Texts of the makefile, the generated project file and the user's.
+    projects: tuple[str, str, str]
     #: Names that the generated dz_board.h has, and the user's has not.
     lacking: tuple[str, ...] = ()
     #: The user's code to compile, by the generated file in whose place it stands.
@@ -86,9 +119,12 @@ def board_of(folder: Path, code: Path, manifest: FirmwareManifest, *, with_code:
     names = [name for name in names if name != header and name.endswith((".c", ".h"))]
     if made is None or values is None or (names and not with_code and code == folder):
         return None
-    taken = names if with_code else []
+    taken, project = names if with_code else [], f"{manifest.target}/{PROJECT_FILE}"
+    places = (code / manifest.target / MAKEFILE, code / project, (folder if project in changed else code) / project)
+    makefile, generated, own = (path.read_text(encoding="utf-8", errors="replace") for path in places)
     return Board(
         values=values,
+        projects=(makefile, generated, own),
         lacking=tuple(sorted(made.keys() - values.keys())),
         code={code / name: (folder / name).resolve() for name in taken},
         taken=(*([header] if header in changed else []), *taken),

@@ -14,15 +14,22 @@ from dzdesign.core.errors import RequirementError
 from dzdesign.verify import requirements
 from dzdesign.verify.exhaustive.exact_drive import STEP_UNIT, DriveModel
 from dzdesign.verify.hardware.exact_current import ExactCurrent
-from dzdesign.verify.hardware.model import HIGH, LOW, Bench, Step, Trace
+from dzdesign.verify.hardware.model import HIGH, LOW, Bench, Due, Step, Trace
+from dzdesign.verify.hardware.serial_line import line_fault, load_begins
 from dzdesign.verify.requirements import Check, Requirement
 
 #: A trip acts without a clock, and lost samples are seen within these times.
 TRIP_S, SAMPLE_LOSS_S = 1e-6, 5e-3
 #: For so long an output must stay low that nothing may release.
 STAYS_LOW_US = 12_000.0
+#: For so long more a firmware is followed with code of the user's, which may do something of its own then.
+LATER_US = 2e6
+#: Bits of the faults, as dz_hardware.h states them.
+NO_SAMPLE, TRIP_INPUT, WATCHDOG, CLOCK, NO_CURRENT = 1, 2, 4, 8, 16
 #: PWM periods of each compare value that is written.
 WRITTEN_PERIODS = 4
+#: PWM periods after which an output is released at the latest, once the trip input is high.
+RELEASE_PERIODS = 6
 #: Least and most samples of each set of codes; in between so many that a ramp goes this share of the command.
 SAMPLES_OF_CODES, RAMPED = (5, 200), 0.06
 #: Codes, of command, pressure A and pressure B; and what carries them.
@@ -128,7 +135,10 @@ class HardwareRuns:
     def following(self) -> Trace:
         """Commands and pressures one after another."""
         steps = [step for at_us, codes in self.followed for step in self.codes(at_us, codes)]
-        return self.bench.run([*steps, *self.coil(), *self.supply()], self.followed[-1][0] + self.set_us)
+        driven_us = self.followed[2][0] + self.sample_us
+        steps += [*self.coil(), *self.supply(), *load_begins(self.bench, driven_us)]
+        later_us = LATER_US if self.bench.runs_user_code else 0.0
+        return self.bench.run(steps, self.followed[-1][0] + self.set_us + later_us)
 
     @cached_property
     def written(self) -> list[tuple[float, int, int]]:
@@ -174,8 +184,10 @@ class HardwareRuns:
         first = next((at for gpio in self.bench.pins for at in trace.pin(gpio).rises()), 0)
         return [at + (first - at) % period for at in trace.times("interrupt")]
 
-    def expected(self, trace: Trace) -> Iterator[tuple[Codes, int, int]]:
-        """Yield the codes and the compare values that each interrupt must give both outputs."""
+    @cached_property
+    def due(self) -> list[Due]:
+        """What each interrupt must leave while commands and pressures follow one another."""
+        trace, found = self.following, list[Due]()
         times = [(trace.count_at(at_us) if at_us > 0 else 0, codes) for at_us, codes in self.followed]
         current = ExactCurrent(self.drive, self.supply_code) if self.drive else None
         own = self.bench.channels.get("CURRENT") if self.drive else None
@@ -192,9 +204,11 @@ class HardwareRuns:
                     model.sample(*codes)
                 if model:
                     model.tick()
-                set_points = (model.compare_a, model.compare_b) if model else (0, 0)
-                yield codes, (current.tick(set_points[0]) if current else set_points[0]), set_points[1]
+                set_point, b, status = model.outputs if model else (0, 0, 0)
+                compares = (current.tick(set_point) if current else set_point, b)
+                found.append(Due(codes, compares, model.side if model else 0, status, model is not None))
                 fresh = False
+        return found
 
 
 def _low(trace: Trace, pins: Sequence[int], begin: int, end: int, when: str) -> str:
@@ -202,9 +216,15 @@ def _low(trace: Trace, pins: Sequence[int], begin: int, end: int, when: str) -> 
     for gpio in pins:
         at = trace.pin(gpio).not_low_from(begin, end)
         if at is not None:
-            level = "high" if trace.pin(gpio).level_at(at) == HIGH else "not driven"
+            level = "high" if trace.pin(gpio).level_at(at) in (LOW, HIGH) else "not driven"  # it may be so for no time
             return f"GPIO{gpio} is {level} {when}, {trace.ms_of(at):.2f} ms after the start"
     return ""
+
+
+def _faults(trace: Trace, expected: int, when: str) -> str:
+    """Tell whether the firmware says another fault than the one that is there, or nothing."""
+    said = trace.faults
+    return "" if said == expected else f"dz_state.fault is 0x{said:04X} {when}, expected 0x{expected:04X}"
 
 
 def _switches(runs: HardwareRuns) -> str:
@@ -220,12 +240,13 @@ def _switches(runs: HardwareRuns) -> str:
         if shortest * signals.tick_Hz != trace.clock_Hz:
             return f"GPIO{gpio} switches at {trace.clock_Hz / shortest:.1f} Hz {clock}, expected {signals.tick_Hz} Hz"
     period, interrupts, frames = runs.period(trace), trace.times("interrupt"), runs.frames(trace)
+    pins = [(gpio, trace.pin(gpio)) for gpio in runs.bench.pins]
     for at, frame in zip(interrupts, frames, strict=True):
         given = [each[1:] for each in runs.written if trace.count_at(each[0]) <= at]
         if not given or frame + period > trace.end:
             continue
-        for gpio, value in zip(runs.bench.pins, given[-1], strict=False):
-            high = trace.pin(gpio).high_counts(frame, frame + period)
+        for (gpio, pin), value in zip(pins, given[-1], strict=False):
+            high = pin.high_counts(frame, frame + period)
             if high != min(value * period // signals.compare_max, period):
                 return f"GPIO{gpio} is high for {high} of {period} counts at compare value {value}"
     return ""
@@ -239,13 +260,16 @@ def _starts_low(runs: HardwareRuns) -> str:
     first = next((each.at for each in trace.events if each.word == "hold"), trace.end)
     if found := _low(trace, runs.bench.pins, 0, first, "before the first sample"):
         return found
-    for words, options in (
-        ("after a reset by the watchdog", {"after_watchdog": True}),
-        ("without the crystal", {"no_crystal": True}),
+    for each in (*trace.early, *(event for event in trace.events if event.at < first)):
+        if each.word == "free" and each.one in runs.bench.pins:
+            return f"GPIO{each.one} is its PWM's before the first sample, and the trip zone does not hold it"
+    for words, fault, options in (
+        ("after a reset by the watchdog", WATCHDOG, {"after_watchdog": True}),
+        ("without the crystal", CLOCK, {"no_crystal": True}),
     ):
         half = Step(runs.released_us, "compare", runs.signals.compare_max // 2, runs.signals.compare_max // 2)
         run = runs.bench.run([*runs.at_rest(), half], runs.released_us + STAYS_LOW_US, **options)
-        if found := _low(run, runs.bench.pins, 0, run.end, words):
+        if found := _low(run, runs.bench.pins, 0, run.end, words) or _faults(run, fault, words):
             return found
     return ""
 
@@ -258,23 +282,26 @@ def _reaches(runs: HardwareRuns) -> str:
         used = role in INPUTS or (runs.drive and (role == "CURRENT" or runs.drive.loop.supply))
         if used and channel not in held:
             return f"{runs.bench.names[role]}, declared for the {role.lower().replace('_', ' ')}, is never converted"
-    for frame, (codes, *compares) in zip(runs.frames(trace), runs.expected(trace), strict=True):
-        for gpio, compare in zip(runs.bench.pins, compares, strict=False):
-            high = trace.pin(gpio).high_counts(frame, frame + period)
+    pins = [(gpio, trace.pin(gpio)) for gpio in runs.bench.pins]
+    for frame, due in zip(runs.frames(trace), runs.due, strict=True):
+        for (gpio, pin), compare in zip(pins, due.compares, strict=False):
+            high = pin.high_counts(frame, frame + period)
             if frame + period <= trace.end and high != compare:
-                given = runs.channel_words(codes)
+                given = runs.channel_words(due.codes)
                 return f"with codes {given}, GPIO{gpio} is high for {high} of {period} counts, expected {compare}"
-    return ""
+    return _faults(trace, 0, "with valid codes")
 
 
-def _switched_off(runs: HardwareRuns, within_s: float, cause: str, *steps: Step) -> str:
+def _switched_off(runs: HardwareRuns, within_s: float, fault: int, cause: str, *steps: Step) -> str:
     """Tell whether what happens to each output while it is high does not switch it off until a reset."""
     for output, gpio in enumerate(runs.bench.pins):
         trace = runs.half_driven(output, *steps)
         at = trace.count_at(runs.happens_us)
         if trace.pin(gpio).level_at(at - 1) != HIGH:
             return f"GPIO{gpio} is not driven before {cause}"
-        if found := _low(trace, runs.bench.pins, at + round(within_s * trace.clock_Hz), trace.end, f"after {cause}"):
+        after = f"after {cause}"
+        late = _low(trace, runs.bench.pins, at + round(within_s * trace.clock_Hz), trace.end, after)
+        if found := late or _faults(trace, fault, after):
             return found
     return ""
 
@@ -285,18 +312,48 @@ def _trips(runs: HardwareRuns) -> str:
             continue
         gpio, at_us = runs.bench.board[name], runs.happens_us
         wired = [Step(-1.0, "wire", gpio, HIGH), Step(at_us, "wire", gpio, LOW), Step(at_us + 1000, "wire", gpio, HIGH)]
-        if found := _switched_off(runs, TRIP_S, f"{words}, GPIO{gpio}, went low", *wired):
+        if found := _switched_off(runs, TRIP_S, TRIP_INPUT, f"{words}, GPIO{gpio}, went low", *wired):
             return found
-        held = runs.half_driven(0, Step(-1.0, "wire", gpio, LOW))
-        if found := _low(held, runs.bench.pins, 0, held.end, f"while {words}, GPIO{gpio}, is low"):
+        if found := _waits_for_trip(runs, gpio, f"{words}, GPIO{gpio},"):
             return found
     return ""
 
 
+def _waits_for_trip(runs: HardwareRuns, gpio: int, words: str) -> str:
+    """Start with a trip input low, then high, and low again when nothing has a clock any more."""
+    lost_us = runs.happens_us + RELEASE_PERIODS * runs.period_us
+    held = runs.half_driven(
+        0, Step(-1.0, "wire", gpio, LOW), Step(runs.happens_us, "wire", gpio, HIGH), Step(lost_us, "clock", 0),
+        Step(lost_us + 1, "wire", gpio, LOW),
+    )  # fmt: skip
+    high, lost, late = (held.count_at(at_us) for at_us in (runs.happens_us, lost_us, lost_us + 1 + 1e6 * TRIP_S))
+    early = _low(held, runs.bench.pins, 0, high, f"while {words} is low")
+    if found := early or _faults(held, 0, f"after a start with {words} low"):
+        return found
+    if held.pin(runs.bench.pins[0]).level_at(lost) != HIGH:
+        return f"GPIO{runs.bench.pins[0]} is not driven after {words} went high"
+    return _low(held, runs.bench.pins, late, held.end, f"after {words} went low without a clock")
+
+
+def _halts(runs: HardwareRuns) -> str:
+    for output, gpio in enumerate(runs.bench.pins):
+        trace = runs.half_driven(output, Step(runs.happens_us, "halt", 0))
+        stopped = trace.count_at(runs.happens_us + runs.period_us)
+        if found := _low(trace, [gpio], stopped, trace.end, "after a debugger halted the processor"):
+            return found
+    return ""
+
+
+def _tells(runs: HardwareRuns) -> str:
+    return line_fault(runs.bench, runs.following, runs.due)
+
+
 def _loses_samples(runs: HardwareRuns) -> str:
     sampled = [role for role in runs.bench.channels if role != "CURRENT"]
-    lost = {"samples were lost": sampled, "codes of the current were lost": ["CURRENT"]}
-    for cause, roles in lost.items():
+    for cause, fault, roles in (
+        ("samples were lost", NO_SAMPLE, sampled),
+        ("codes of the current were lost", NO_CURRENT, ["CURRENT"]),
+    ):
         if "CURRENT" in roles and runs.drive is None:
             continue
         again_us = runs.happens_us + SAMPLE_LOSS_S * 1e6
@@ -305,7 +362,7 @@ def _loses_samples(runs: HardwareRuns) -> str:
             for role in roles
             for at_us, hears in ((runs.happens_us, 0), (again_us, 1))
         ]
-        if found := _switched_off(runs, SAMPLE_LOSS_S, cause, *steps):
+        if found := _switched_off(runs, SAMPLE_LOSS_S, fault, cause, *steps):
             return found
     return ""
 
@@ -344,17 +401,17 @@ def _at_its_rate(runs: HardwareRuns) -> str:
     if {Fraction(trace.clock_Hz, counts) for counts in apart} != {Fraction(signals.sample_Hz)}:
         rates = ", ".join(f"{trace.clock_Hz / counts:.1f}" for counts in sorted(apart)[:3])
         return f"samples come at {rates or 0} Hz, expected {signals.sample_Hz} Hz"
-    transmits, sent = runs.bench.board.get("SCI_TX_GPIO"), {each.one for each in trace.events if each.word == "octet"}
-    if transmits is not None and sent != {transmits}:
-        return f"the telemetry does not leave on GPIO{transmits}"
+    if trace.times("acknowledged"):
+        return "the interrupt acknowledges those of other groups too, which then come in between"
     return ""
 
 
 def _never_both(runs: HardwareRuns) -> str:
     one, other = runs.bench.pins
     for trace in (runs.following, runs.writing):
-        for at in sorted({*trace.pin(one).times, *trace.pin(other).times}):
-            if trace.pin(one).level_at(at) != LOW and trace.pin(other).level_at(at) != LOW:
+        first, second = trace.pin(one), trace.pin(other)
+        for at in sorted({*first.times, *second.times}):
+            if first.level_at(at) != LOW and second.level_at(at) != LOW:
                 return f"GPIO{one} and GPIO{other} are high at once, {trace.ms_of(at):.2f} ms after the start"
     return ""
 
@@ -392,6 +449,8 @@ TRIED: tuple[tuple[Requirement, Callable[[HardwareRuns], str], str], ...] = (
     (requirements.HARDWARE_WATCHDOG, _watched, "within {watchdog_ms:.2f} ms, or the main loop; not before"),
     (requirements.HARDWARE_RATES, _at_its_rate, "interrupts at {tick_Hz} Hz, samples at {sample_Hz} Hz"),
     (requirements.HARDWARE_SOLENOIDS, _never_both, "{pins} are never high at once"),
+    (requirements.HARDWARE_HALT, _halts, "{pins} low from the end of the period on"),
+    (requirements.HARDWARE_TELEMETRY, _tells, "each frame on GPIO{line} says what the exact law and drive give"),
     (requirements.HARDWARE_CURRENT, _samples_the_current, "{parts} codes in a PWM period, at the middles of its parts"),
 )  # fmt: skip
 
@@ -409,9 +468,15 @@ def hardware_checks(make: Callable[[], Bench]) -> Iterator[Check]:
         "pins": " and ".join(f"GPIO{gpio}" for gpio in bench.pins), "tick_Hz": signals.tick_Hz,
         "sample_Hz": signals.sample_Hz, "full": signals.compare_max, "sets": len(runs.followed),
         "names": ", ".join(bench.names[role] for role in INPUTS), "watchdog_ms": 1e3 * bench.watchdog_s,
-        "trip": bench.board["TRIP_GPIO"], "parts": runs.drive.sampling.samples if runs.drive else 0,
+        "trip": bench.board["TRIP_GPIO"], "line": bench.board.get("SCI_TX_GPIO"),
+        "parts": runs.drive.sampling.samples if runs.drive else 0,
     }  # fmt: skip
-    applies = {requirements.HARDWARE_SOLENOIDS: bench.two, requirements.HARDWARE_CURRENT: runs.drive is not None}
+    applies = {
+        requirements.HARDWARE_SOLENOIDS: bench.two,
+        requirements.HARDWARE_HALT: bench.device.halts_low,
+        requirements.HARDWARE_TELEMETRY: "SCI_TX_GPIO" in bench.board,
+        requirements.HARDWARE_CURRENT: runs.drive is not None,
+    }
     for requirement, tried, found in TRIED:
         if applies.get(requirement, True):
             try:

@@ -2,19 +2,19 @@
 
 import re
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
-from dzdesign.core.documents import sha256_of
+from dzdesign.core.documents import read_bytes, sha256_of
 from dzdesign.core.errors import RequirementError
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.firmware_manifest import FirmwareManifest
+from dzdesign.design.firmware_manifest import BLOCK_FILE, FirmwareManifest
 from dzdesign.verify.folder import USER_FOLDER
-from dzdesign.verify.hardware.board_values import Board
+from dzdesign.verify.hardware.board_values import Board, project_defines
 from dzdesign.verify.toolchain.host_compiler import STRICT, build, build_folder, host_compiler, words_of
 from dzdesign.verify.toolchain.machines import run_child
 
@@ -22,7 +22,7 @@ HERE = Path(str(files("dzdesign.verify.hardware")))
 #: A self test has a main() of its own.
 NOT_LINKED = ("main.c", "dz_selftest.c", "selftest.c")
 OPTIONS = ("-O1", "-Wenum-conversion", "-Wno-pedantic")
-MAIN_OPTIONS = ("-Dmain=firmware_main", "-finstrument-functions", "-D_FLASH")
+MAIN_OPTIONS = ("-Dmain=firmware_main", "-finstrument-functions")
 #: A run takes some hundredths of a second.
 RUN_S = 15.0
 LOW, HIGH = 0, 1
@@ -40,16 +40,18 @@ class Device:
     #: Clock of the watchdog; None: the crystal. It resets after 2^17 periods, times a factor of the board's.
     watchdog_Hz: int | None
     prescale: str
+    #: Whether the counter goes on to the end of its period, where the pin is low, when a debugger halts the processor.
+    halts_low: bool
 
 
 DEVICES = {
     "f28335": Device(
         crystal_Hz=30_000_000, channels=tuple(f"{half}{n}" for half in "AB" for n in range(8)), watchdog_Hz=None,
-        prescale="WDPS",
+        prescale="WDPS", halts_low=True,
     ),
     "f280049c": Device(
         crystal_Hz=20_000_000, channels=tuple(f"A{n}" for n in range(16)), watchdog_Hz=10_000_000,
-        prescale="WD_PRESCALE",
+        prescale="WD_PRESCALE", halts_low=False,
     ),
 }  # fmt: skip
 WATCHDOG_PERIODS = 512 * 256
@@ -72,6 +74,16 @@ class Event(NamedTuple):
     word: str
     one: int
     two: int
+
+
+class Due(NamedTuple):
+    """What an interrupt must leave: codes of the last sample, compare values, the drive's side and its status."""
+
+    codes: tuple[int, int, int]
+    compares: tuple[int, int]
+    side: int
+    status: int
+    released: bool
 
 
 class Pin:
@@ -138,6 +150,11 @@ class Trace:
         own = [each for each in self.events if (each.word, each.one) == ("pin", gpio)]
         return Pin(own, early[-1] if early else LOW)
 
+    @property
+    def faults(self) -> int:
+        """The faults that the firmware has found, a bit each."""
+        return next((each.one for each in reversed(self.events) if each.word == "fault"), 0)
+
     def pins_that_switch(self) -> list[int]:
         """Return the pins that change after the start."""
         found = {each.one for each in self.events if each.word == "pin" and each.at > self.start}
@@ -161,6 +178,10 @@ class Bench:
     def __init__(self, code: Path, manifest: FirmwareManifest, compensator: Compensator, board: Board) -> None:
         self.compensator, self.board, self.device = compensator, board.values, DEVICES[manifest.target]
         self._target, self._user, self._failure = manifest.target, board.code, ""
+        #: Start of the compensator's hash; octets of the block that the firmware takes another for over its line.
+        self.origin = int(manifest.origin.compensator_json[:4], 16)
+        takes = manifest.calibration == "block" and "SCI_RX_GPIO" in self.board
+        self.block = read_bytes(code / BLOCK_FILE, "calibration block of the firmware") if takes else b""
         target = compensator.target
         names = (target.channels if target else ()) or self.device.channels[:5]
         self.crystal_Hz = (target.crystal_Hz if target else None) or self.device.crystal_Hz
@@ -170,7 +191,12 @@ class Bench:
         self.two = len(compensator.signals.signs) == 2
         if board.lacking:
             raise RequirementError(f"dz_board.h has no DZ_BOARD_{board.lacking[0]}, which the firmware needs")
-        self._build(code)
+        self._build(code, project_defines(*board.projects))
+
+    @property
+    def runs_user_code(self) -> bool:
+        """Whether code of the user's is compiled in."""
+        return bool(self._user)
 
     @property
     def pins(self) -> list[int]:
@@ -197,7 +223,7 @@ class Bench:
         factor = setting if self.device.prescale == "WD_PRESCALE" else 2 ** max(setting - 1, 0)
         return WATCHDOG_PERIODS * factor / (self.device.watchdog_Hz or self.crystal_Hz)
 
-    def _build(self, code: Path) -> None:
+    def _build(self, code: Path, project: Mapping[str, str]) -> None:
         """Compile the firmware with the model; a file that does not compile is a `RequirementError`."""
         units = [path.relative_to(code) for path in sorted(code.rglob("*.c"))]
         units = [path for path in units if path.name not in NOT_LINKED and code / path not in self._user]
@@ -206,7 +232,8 @@ class Bench:
         folders = ["core", self._target, USER_FOLDER, str(HERE / self._target), str(HERE / "programs")]
         folders = [*dict.fromkeys(str(path.parent) for path in self._user.values()), *folders]
         flags = [*(["-std=gnu99", "-w"] if self._user else STRICT), *OPTIONS, *(f"-I{folder}" for folder in folders)]
-        flags += [f"-DDZ_BOARD_{name}={value}" for name, value in self.board.items()]
+        defines = {f"DZ_BOARD_{name}": str(value) for name, value in self.board.items()} | dict(project)
+        flags += [f"-D{name}={value}" for name, value in defines.items()]
         flags += ["-DDEVICE_FROM_FLASH", "-D__interrupt="]  # a word of TI's compiler, which dz_isr.h has by itself
         flags += ["-DTWO_SOLENOIDS"] if self.two else []
         digest = sha256_of("\n".join([str(code), *map(str, units), *flags]).encode())[:16]

@@ -24,9 +24,14 @@ static bool burst, converter, flags[2], overflow[2], flag_on[2];
 static double powered_s;
 static uint32_t trip_pin[6] = {0u, 0u, 0u, 0u, 0u, 0u}; /* GPIO0 after a reset */
 static uint32_t function_of[GPIOS];
-static bool pull_up[GPIOS], outputs[GPIOS], inverted[GPIOS];
+static bool pull_up[GPIOS], outputs[GPIOS], inverted[GPIOS], asynchronous[GPIOS];
 static void (*handlers[MODULES])(void);
 static bool enabled[MODULES], pie_blocked, without_oscillator;
+#ifdef DEVICE_FROM_FLASH
+static bool copied = false; /* functions of .TI.ramfunc, to where they run */
+#else
+static bool copied = true;
+#endif
 static uint32_t reset_cause;
 static double oscillator_hz;
 static uint32_t prediv = 512u, prescale = 1u;
@@ -211,7 +216,7 @@ void GPIO_setPadConfig(uint32_t pin, uint32_t type)
     inverted[pin] = (type & GPIO_PIN_TYPE_INVERT) != 0u;
     settle();
 }
-void GPIO_setQualificationMode(uint32_t pin, GPIO_QualificationMode mode) { (void)pin, (void)mode; }
+void GPIO_setQualificationMode(uint32_t pin, GPIO_QualificationMode mode) { asynchronous[pin] = mode == GPIO_QUAL_ASYNC; }
 void GPIO_setPinConfig(uint32_t config)
 {
     function_of[config / 16u] = config % 16u;
@@ -226,9 +231,11 @@ void XBAR_setInputPin(XBAR_InputNum input, uint16_t pin)
     }
 }
 
+int module_of(unsigned gpio) { return ((function_of[gpio] == PIN_OF_PWM) && (gpio < 2u * EPWM_MODULES)) ? (int)(gpio / 2u) : -1; }
+
 unsigned level_of(unsigned gpio)
 {
-    if ((function_of[gpio] == PIN_OF_PWM) && (gpio < 2u * EPWM_MODULES))
+    if (module_of(gpio) >= 0)
     {
         return level_of_pwm(&pwms[gpio / 2u]);
     }
@@ -239,19 +246,21 @@ unsigned level_of(unsigned gpio)
     return (outside[gpio] == OPEN) ? (pull_up[gpio] ? HIGH : LOW) : inverted[gpio] ? HIGH - outside[gpio] : outside[gpio];
 }
 
-/* TZ1 to TZ3 come from the inputs 1 to 3 of the X-BAR. */
+/* TZ1 to TZ3 come from the inputs 1 to 3 of the X-BAR; without a clock only from a pin that is asynchronous. */
 unsigned trip_signals(void)
 {
     unsigned signals = 0u;
 
     for (unsigned n = 0u; n < 3u; n++)
     {
-        signals |= (level_of(trip_pin[n]) == LOW) ? 1u << n : 0u;
+        signals |= ((level_of(trip_pin[n]) == LOW) && (asynchronous[trip_pin[n]] || !clock_lost)) ? 1u << n : 0u;
     }
     return signals;
 }
 
 void settle_registers(void) {}
+
+void receive(unsigned gpio, uint8_t octet) { (void)gpio, (void)octet; }
 
 void Interrupt_initModule(void) {}
 void Interrupt_initVectorTable(void) {}
@@ -259,7 +268,7 @@ void Interrupt_register(uint32_t number, void (*handler)(void)) { handlers[numbe
 void Interrupt_enable(uint32_t number) { enabled[number - INT_EPWM1] = true; }
 void Interrupt_clearACKGroup(uint16_t group) { pie_blocked = pie_blocked && (group != INTERRUPT_ACK_GROUP3); }
 
-bool interrupt_passes(unsigned module) { return enabled[module] && !pie_blocked && (handlers[module] != 0); }
+bool interrupt_passes(unsigned module) { return enabled[module] && !pie_blocked && copied && (handlers[module] != 0); }
 
 void serve(unsigned module)
 {
@@ -315,9 +324,12 @@ void device_delay(uint32_t us)
     powered_s += us * 1e-6;
     delay(us * 1e-6);
 }
-/* TI's device.c: watchdog off, the PLL at 5 times the oscillator, all peripheral clocks on. */
+/* TI's device.c: watchdog off, the PLL at 5 times the oscillator, all peripheral clocks on; _FLASH copies .TI.ramfunc. */
 void Device_init(void)
 {
+#ifdef _FLASH
+    copied = true;
+#endif
     watchdog_on = false;
     set_clock(oscillator_hz * (DEVICE_SYSCLK_FREQ / DEVICE_OSCSRC_FREQ));
     counters_run = true;

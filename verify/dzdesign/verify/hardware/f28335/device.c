@@ -9,6 +9,8 @@
 #define WDCHK 5u
 #define WATCHDOG_PERIODS (512.0 * 256.0) /* of the crystal */
 #define PLL_LOCK_PERIODS 131072.0
+#define ASYNCHRONOUS 3u /* GPAQSEL */
+#define OTHER_GROUPS 0x0FFBu
 
 volatile struct EPWM_REGS EPwmRegs[EPWM_MODULES];
 volatile struct ADC_REGS AdcRegs;
@@ -121,12 +123,25 @@ void device_eallow(void)
     unlocked = true;
 }
 
+/* Which of the writes since EALLOW came first is not known: pull-ups are seen before pins change their function. */
+static void settle_pull_ups(void)
+{
+    const struct GPIO_CTRL_REGS written = GpioCtrlRegs;
+
+    GpioCtrlRegs = kept.gpio_ctrl;
+    GpioCtrlRegs.GPAPUD = written.GPAPUD;
+    GpioCtrlRegs.GPBPUD = written.GPBPUD;
+    settle();
+    GpioCtrlRegs = written;
+}
+
 void device_edis(void)
 {
     if (!unlocked)
     {
         undo_writes();
     }
+    settle_pull_ups();
     unlocked = false;
     kept = protected_now();
     clock_from_registers();
@@ -154,6 +169,8 @@ unsigned mux_of(unsigned gpio)
 }
 
 /* GPIO0, 2, ... 10 are outputs A of the modules; output B of none is used. */
+int module_of(unsigned gpio) { return ((gpio < 2u * EPWM_MODULES) && (gpio % 2u == 0u) && (mux_of(gpio) == 1u)) ? (int)(gpio / 2u) : -1; }
+
 unsigned level_of(unsigned gpio)
 {
     const uint32_t bit = UINT32_C(1) << (gpio % 32u);
@@ -162,13 +179,21 @@ unsigned level_of(unsigned gpio)
 
     if ((gpio < 2u * EPWM_MODULES) && (mux_of(gpio) == 1u))
     {
-        return (gpio % 2u == 0u) ? level_of_pwm(&pwms[gpio / 2u]) : LOW;
+        return (module_of(gpio) >= 0) ? level_of_pwm(&pwms[gpio / 2u]) : LOW;
     }
     if ((mux_of(gpio) == 0u) && ((output & bit) != 0u))
     {
         return (((gpio < 32u) ? GpioDataRegs.GPADAT.all : GpioDataRegs.GPBDAT.all) & bit) != 0u ? HIGH : LOW;
     }
     return (outside[gpio] != OPEN) ? outside[gpio] : ((pull_up_off & bit) == 0u) ? HIGH : LOW;
+}
+
+/* Without a clock only an input that is asynchronous passes. */
+static bool trips(unsigned gpio)
+{
+    const unsigned qualifier = of_pin(GpioCtrlRegs.GPAQSEL1.all, GpioCtrlRegs.GPAQSEL2.all, gpio);
+
+    return (level_of(gpio) == LOW) && ((qualifier == ASYNCHRONOUS) || !clock_lost);
 }
 
 /* TZ1 to TZ6 are GPIO12 to GPIO17; TZ5 and TZ6 are GPIO28 and GPIO29 too. */
@@ -180,9 +205,9 @@ unsigned trip_signals(void)
     {
         const unsigned gpio = 12u + n;
         const bool taken = mux_of(gpio) == ((gpio < 16u) ? 1u : 3u);
-        const bool other = (n >= 4u) && (mux_of(24u + n) == 3u) && (level_of(24u + n) == LOW);
+        const bool other = (n >= 4u) && (mux_of(24u + n) == 3u) && trips(24u + n);
 
-        signals |= ((taken && (level_of(gpio) == LOW)) || other) ? 1u << n : 0u;
+        signals |= ((taken && trips(gpio)) || other) ? 1u << n : 0u;
     }
     return signals;
 }
@@ -212,6 +237,7 @@ static void settle_pwm(unsigned module)
     pwm->force = regs->AQCSFRC.bit.CSFA;
     pwm->force_at_once = regs->AQSFRC.bit.RLDCSF == 3u;
     pwm->trip_action = regs->TZCTL.bit.TZA;
+    pwm->at_halt = regs->TBCTL.bit.FREE_SOFT;
     pwm->one_shot = (regs->TZSEL.all >> 8) & 0x3Fu;
     pwm->trigger[SOC_A].on = regs->ETSEL.bit.SOCAEN == 1u;
     pwm->trigger[SOC_A].event = regs->ETSEL.bit.SOCASEL;
@@ -341,7 +367,7 @@ void converted(const struct conversion *conversion)
     }
 }
 
-/* PIE group 3: until it is acknowledged no other interrupt of it comes. An interrupt that was not copied to where it runs
+/* PIE group 3: until it is acknowledged no other interrupt of it comes. Other groups wait for theirs meanwhile. An interrupt that was not copied to where it runs
  * from, in the FLASH build, does nothing either. */
 bool interrupt_passes(unsigned module)
 {
@@ -351,11 +377,15 @@ bool interrupt_passes(unsigned module)
 
 void serve(unsigned module)
 {
-    PieCtrlRegs.PIEACK.all = 0u;
+    PieCtrlRegs.PIEACK.all = OTHER_GROUPS;
     interrupts_on = false;
     (&PieVectTable.EPWM1_INT)[module]();
     interrupts_on = true;
     pie_blocked = (PieCtrlRegs.PIEACK.all & PIEACK_GROUP3) == 0u;
+    if (!pie_blocked && (PieCtrlRegs.PIEACK.all != PIEACK_GROUP3))
+    {
+        happened("acknowledged", PieCtrlRegs.PIEACK.all, 0u);
+    }
 }
 
 void power_up(bool after_watchdog, bool without_crystal, double hz)

@@ -15,6 +15,7 @@ struct line
     uint8_t out[FIFO_OCTETS], in[FIFO_OCTETS];
     unsigned out_count, in_count;
     int64_t free_from; /* when the transmitter has sent what it sends */
+    int64_t pace;      /* counts of the last octet */
     bool seen;
 };
 
@@ -70,7 +71,12 @@ static void settle_line(unsigned number)
 
     while ((line->out_count > 0u) && !serial_blocked && (line->free_from + counts_of_octet(sci) <= now))
     {
-        line->free_from += counts_of_octet(sci);
+        if (line->pace != counts_of_octet(sci))
+        {
+            line->pace = counts_of_octet(sci);
+            happened("pace", gpio_of(transmits, number), (unsigned)line->pace);
+        }
+        line->free_from += line->pace;
         happened("octet", gpio_of(transmits, number), line->out[0]);
         line->out_count--;
         memmove(line->out, line->out + 1, line->out_count);
@@ -123,6 +129,17 @@ void serial_receive(unsigned number, uint8_t octet)
     else
     {
         serial_missed++;
+    }
+}
+
+void receive(unsigned gpio, uint8_t octet)
+{
+    for (unsigned number = 0u; number < LINES; number++)
+    {
+        if (gpio_of(receives, number) == gpio)
+        {
+            serial_receive(number, octet);
+        }
     }
 }
 

@@ -9,7 +9,7 @@
 struct pwm pwms[MODULES];
 int64_t now, conversion_delay;
 double sysclk_hz = 1e6, watchdog_s;
-bool counters_run, watchdog_on, interrupts_on;
+bool counters_run, watchdog_on, interrupts_on, halted, clock_lost;
 uint8_t outside[GPIOS];
 
 /* The module that a module's synchronisation comes from: 1 to 2 to 3, 1 to 4 to 5 to 6, and 1 to 7 to 8. */
@@ -18,6 +18,7 @@ static struct conversion conversions[MOST_CONVERSIONS];
 static unsigned conversion_count;
 static double served_s, clock_set_s;
 static uint8_t level_before[GPIOS];
+static bool free_before[GPIOS];
 
 double seconds_now(void) { return clock_set_s + (double)now / sysclk_hz; }
 
@@ -66,8 +67,9 @@ static uint32_t place_of(const struct pwm *pwm, uint32_t value, bool down)
 static int64_t next_of(const struct pwm *pwm)
 {
     uint32_t next = cycle_of(pwm);
+    const bool stops = (pwm->at_halt == STOPS_AT_ONCE) || ((pwm->at_halt == STOPS_AT_PERIOD) && (pwm->at == pwm->active_period));
 
-    if (!pwm->counts)
+    if (!pwm->counts || clock_lost || (halted && stops))
     {
         return NEVER;
     }
@@ -208,12 +210,19 @@ void settle(void)
     for (unsigned gpio = 0u; gpio < GPIOS; gpio++)
     {
         const uint8_t level = (uint8_t)level_of(gpio);
+        const int module = module_of(gpio);
+        const bool is_free = (module >= 0) && !pwms[module].tripped; /* no trip zone holds it */
 
         if (level != level_before[gpio])
         {
             happened("pin", gpio, level);
         }
         level_before[gpio] = level;
+        if (is_free != free_before[gpio])
+        {
+            happened("free", gpio, is_free);
+        }
+        free_before[gpio] = is_free;
     }
 }
 

@@ -20,11 +20,12 @@ enum counting { UP, DOWN, UP_DOWN, STOPPED };
 enum trigger { SOC_A, SOC_B, INTERRUPT, TRIGGERS };
 enum trip_action { FLOATS, FORCED_HIGH, FORCED_LOW, NOT_FORCED };
 enum level { LOW, HIGH, OPEN };
+enum at_halt { STOPS_AT_ONCE, STOPS_AT_PERIOD }; /* what a debugger's halt does to a counter; else it runs on */
 
 struct pwm
 {
     /* As the registers say. */
-    uint32_t counting, divider, period, compare[2], phase, sync_out, force, trip_action, one_shot;
+    uint32_t counting, divider, period, compare[2], phase, sync_out, force, trip_action, one_shot, at_halt;
     bool period_at_once, compare_at_once, force_at_once, in_phase;
     uint32_t action[8]; /* by event */
     struct
@@ -51,6 +52,7 @@ extern struct pwm pwms[MODULES];
 extern int64_t now;
 extern double sysclk_hz;
 extern bool counters_run, watchdog_on, interrupts_on;
+extern bool halted, clock_lost; /* by a debugger; the device stands still, but for what needs no clock */
 extern double watchdog_s;
 extern int64_t conversion_delay; /* so much later a converter is done */
 extern uint8_t outside[GPIOS]; /* enum level of what is wired to a pin */
@@ -68,8 +70,10 @@ void reset_by_watchdog(void);
 void settle_registers(void); /* `pwms` as they are now, and what the registers show of the modules */
 unsigned trip_signals(void); /* bit n: TZ(n + 1) is low */
 unsigned level_of(unsigned gpio);
+int module_of(unsigned gpio); /* whose output A is on a pin, or -1 */
 void start_conversions(unsigned module, enum trigger trigger);
 void converted(const struct conversion *conversion);
+void receive(unsigned gpio, uint8_t octet); /* of a serial line */
 bool interrupt_passes(unsigned module); /* and then it is blocked */
 void serve(unsigned module);
 void power_up(bool after_watchdog, bool without_crystal, double crystal_hz);

@@ -6,6 +6,8 @@
  * What happens from a time on, counted from where interrupts are enabled, or -1 before the start:
  * code CHANNEL CODE     what a channel converts to             wire GPIO LEVEL     0 low, 1 high, 2 open
  * converter ON CHANNEL  whether its starts are heard          interrupts ON 0     whether the processor takes them
+ * halt 0 0              by a debugger                         clock 0 0           stands still
+ * octet VALUE GPIO      comes on a serial line
  * compare A B           written after each interrupt           coil CHANNEL GPIO   a solenoid and its sensor, with
  * sensor CODES_PER_A ZERO_CODE, winding OHM HENRY, supply V DIODE_V and flows A 0 (at the start)
  *
@@ -17,6 +19,7 @@
 
 #include "dz_comp.h"
 #include "dz_hardware.h"
+#include "dz_isr.h"
 #include "engine.h"
 #include "solenoid.h"
 
@@ -42,6 +45,18 @@ static unsigned coil_channel = CHANNELS, coil_gpio = GPIOS;
 static struct solenoid solenoid;
 static jmp_buf out;
 
+/* What the firmware says is wrong, when that changes. */
+static void tell_faults(void)
+{
+    static unsigned told;
+
+    if (dz_state.fault != told)
+    {
+        told = dz_state.fault;
+        happened("fault", told, 0u);
+    }
+}
+
 void happened(const char *what, unsigned one, unsigned two)
 {
     if ((strcmp(what, "pin") == 0) && (one == coil_gpio))
@@ -55,6 +70,10 @@ void happened(const char *what, unsigned one, unsigned two)
         started_s = seconds_now();
     }
     printf("%lld %s %u %u\n", (long long)now, what, one, two);
+    if (strcmp(what, "start") == 0)
+    {
+        tell_faults();
+    }
 }
 
 uint16_t code_at(unsigned channel)
@@ -73,6 +92,7 @@ bool processor_takes_interrupts(void) { return !interrupts_off; }
 
 void after_interrupt(void)
 {
+    tell_faults();
     if (writes)
     {
         dz_write_compare_a(compares[0]);
@@ -108,6 +128,18 @@ void act(void)
     else if (strcmp(step->word, "interrupts") == 0)
     {
         interrupts_off = one == 0u;
+    }
+    else if (strcmp(step->word, "halt") == 0)
+    {
+        halted = interrupts_off = hangs = true;
+    }
+    else if (strcmp(step->word, "clock") == 0)
+    {
+        clock_lost = true;
+    }
+    else if (strcmp(step->word, "octet") == 0)
+    {
+        receive(two, (uint8_t)one);
     }
     else if (strcmp(step->word, "turns") == 0)
     {
