@@ -18,7 +18,8 @@ def screen(monkeypatch, capsys):
     """What a terminal of 80 columns shows of a printer."""
     from rich.console import Console
 
-    monkeypatch.setattr(brief, "new_console", lambda: Console(highlight=False, width=80, force_terminal=True, color_system=None))
+    terminal = Console(highlight=False, width=80, force_terminal=True, color_system=None)
+    monkeypatch.setattr(brief, "new_console", lambda: terminal)
 
     def shown(printer, result):
         printer(result)
@@ -43,7 +44,8 @@ def test_a_valve_and_a_design_fit_one_screen(sides, example_valve, screen):
 
 
 def test_a_warning_of_both_sides_stands_once(example_valve, screen):
-    warnings = example_valve.warnings + tuple(Warning_(code="few-repeats", text="a text " * 30, source=name) for name in ("a.csv", "b.csv"))
+    twice = tuple(Warning_(code="few-repeats", text="a text " * 30, source=name) for name in ("a.csv", "b.csv"))
+    warnings = example_valve.warnings + twice
     lines = screen(brief.print_valve, replace(example_valve, warnings=warnings))
     (line,) = [each for each in lines if "few-repeats" in each]
     assert "(2)" in line and line.endswith("...") and len(line) <= 80
