@@ -83,13 +83,13 @@ def recordings(folder, *, signed):
 def test_identify_says_the_direction_and_what_to_type_next(tmp_path, monkeypatch, capsys, signed):
     monkeypatch.chdir(tmp_path)
     recordings(tmp_path, signed=signed)
-    assert main(["identify", "*.csv", "--meter-lag", "0.1 s", "--curve", "line"]) == 0
+    assert main(["-v", "identify", "*.csv", "--meter-lag", "0.1 s", "--curve", "line"]) == 0
     out = capsys.readouterr().out
     drop = "pB_MPa - pA_MPa (recorded below zero)" if signed else "pA_MPa - pB_MPa"
     assert f"pressure drop at negative commands: {drop}\n" in out
-    (command,) = [line.strip() for line in out.splitlines() if line.startswith("  dzdesign design")]
-    assert command == 'dzdesign design valve.json --command-signal "-10..10 V x 0.12 + 1.5 V"'
-    assert main(["design", "valve.json", "--command-signal", "-10..10 V x 0.12 + 1.5 V"]) == 0
+    (command,) = [line for line in out.splitlines() if line.startswith("Next: ")]
+    assert command == 'Next: dzdesign design valve.json --command-signal "-10..10 V x 0.12 + 1.5 V"'
+    assert main(["-v", "design", "valve.json", "--command-signal", "-10..10 V x 0.12 + 1.5 V"]) == 0
     way = "B minus A" if signed else "A minus B"
     assert f"negative commands: the pressure drop is {way}, as recorded" in " ".join(capsys.readouterr().out.split())
     assert main(["init", "*.csv"]) == 0

@@ -47,10 +47,12 @@ def write_ramp(
 
 
 def run(*words) -> tuple[int, str]:
-    out = io.StringIO()
-    with redirect_stdout(out), redirect_stderr(out):
-        status = main([str(word) for word in words])
-    return status, out.getvalue()
+    """Return what a command prints, with all details but the log; its messages where it fails."""
+    out, log = io.StringIO(), io.StringIO()
+    detailed = ["-v"] if words[0] in ("identify", "design") else []
+    with redirect_stdout(out), redirect_stderr(log if detailed else out):
+        status = main([*detailed, *(str(word) for word in words)])
+    return status, out.getvalue() if status == 0 else out.getvalue() + log.getvalue()
 
 
 def numbers_as_computed(text):
@@ -95,11 +97,15 @@ def test_the_files_stay_in_volts_and_say_what_is_shown(folder, printed):
     assert document["recorded_units"]["flow"]["factor"] == pytest.approx(1 / 3.785411784, rel=1e-11)
 
 
-def test_identify_and_design_print_no_other_unit(folder, printed):
+def test_identify_and_design_print_no_other_unit(folder, printed, ramps):
     pages = {
         "identify": printed,
         "design": run("design", folder / "valve.json", "-o", folder / "compensator.json")[1],
     }
+    for words in (["identify", *ramps, "--columns", COLUMNS, *LAG, *LINE], ["design", str(folder / "valve.json")]):
+        with redirect_stdout(out := io.StringIO()):
+            assert main([*words, "-o", str(folder / f"brief_{words[0]}.json")]) == 0
+        assert not numbers_as_computed(out.getvalue()) and "bar" in out.getvalue()
     for name, text in pages.items():
         assert not numbers_as_computed(text), name
         assert "bar" in text and "mA" in text and "gpm" in text, name
