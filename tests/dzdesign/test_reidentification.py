@@ -228,7 +228,7 @@ def test_the_command_says_it_in_verdict_and_report(valve, ramps, tmp_path, monke
     monkeypatch.chdir(tmp_path)
     api.generate(api.design(valve), target="host", output="firmware")
     files = [str(file) for file in in_folder(ramps)]
-    assert main(["verify", "firmware", "--ramps", *files, "-o", "with"]) == 0
+    assert main(["-v", "verify", "firmware", "--ramps", *files, "-o", "with"]) == 0
     said = capsys.readouterr().out
     assert AS_STATED not in said and "every number is the same" in said
     assert AS_STATED not in (tmp_path / "with" / "report.html").read_text().partition("</header>")[0]

@@ -41,7 +41,7 @@ def verify(folder_of, tmp_path, monkeypatch, capsys):
         folder = tmp_path / target
         shutil.copytree(folder_of / target, folder)
         change(folder)
-        status = main(["verify", str(folder), "-o", str(tmp_path / "evidence"), *options])
+        status = main(["-v", "verify", str(folder), "-o", str(tmp_path / "evidence"), *options])
         out, err = capsys.readouterr()
         return status, "\n".join(line for line in (out + err).splitlines() if not line.startswith("HOLDS"))
 

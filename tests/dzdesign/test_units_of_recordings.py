@@ -49,7 +49,7 @@ def write_ramp(
 def run(*words) -> tuple[int, str]:
     """Return what a command prints, with all details but the log; its messages where it fails."""
     out, log = io.StringIO(), io.StringIO()
-    detailed = ["-v"] if words[0] in ("identify", "design") else []
+    detailed = ["-v"] if words[0] in ("identify", "design", "verify") else []
     with redirect_stdout(out), redirect_stderr(log if detailed else out):
         status = main([*detailed, *(str(word) for word in words)])
     return status, out.getvalue() if status == 0 else out.getvalue() + log.getvalue()

@@ -183,7 +183,7 @@ RELAYS: Mapping[str, Relay] = {
             'dzdesign verify calibrated/lot/firmware --blocks "calibrated/valves/*/calibration.bin"',
             "dzdesign verify firmware --machine-code",
         ),
-        "terminal.evidence_tables:print_result", _after_verify, holds=_holds,
+        "terminal.brief:print_result", _after_verify, holds=_holds,
         document=lambda made, arguments: made.evidence,
     ),
     "assess": Relay(

@@ -1,9 +1,11 @@
-"""One screen for a valve and for a design: the result, what limits it, the warnings. ``-v`` has everything."""
+"""One screen for a valve, a design and a verification: the result and what limits it. ``-v`` has everything."""
 
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from dzdesign.terminal import design_tables, tables
+from dzdesign.core.display import verdict_words
+from dzdesign.core.recorded_units import AS_COMPUTED
+from dzdesign.terminal import design_tables, evidence_tables, tables
 from dzdesign.terminal.page import Column, new_console, put_line, put_rows
 from dzdesign.terminal.progress import is_verbose
 
@@ -16,6 +18,10 @@ if TYPE_CHECKING:
     from dzdesign.identify.valve.model import ValveModel, Warning_
     from dzdesign.identify.valve.ramp_result import TestResult
     from dzdesign.identify.valve.side_model import SideModel
+    from dzdesign.verify.evidence import Evidence
+    from dzdesign.verify.loop_results import PressureResult
+    from dzdesign.verify.outputs.verification import OutputVerification
+    from dzdesign.verify.verification import Verification
 
 #: Characters of a warning beside its code, on a screen of 80.
 LONGEST_WARNING = 76
@@ -91,6 +97,58 @@ def print_design(compensator: "Compensator") -> None:
     for line in design_warnings(compensator):
         put_line(console, f"warning: {line}")
     put_line(console, "More: -v, which also states the price of each choice.")
+
+
+def print_result(verification: "Verification | OutputVerification") -> None:
+    """Print what does not hold or was not checked, the dead zones in closed loop, and the verdict on a C firmware.
+
+    Of another output, which has few requirements, it is all of them.
+    """
+    from dzdesign.verify.verification import Verification
+
+    if is_verbose() or not isinstance(verification, Verification):
+        evidence_tables.print_result(verification)
+        return
+    console, evidence = new_console(), verification.evidence
+    for check in evidence.checks:
+        if check.holds is not True:
+            put_line(console, f"{verdict_words(check.holds)}  {check.name}: {check.text}")
+    held, tried, wrong = (
+        sum(check.holds is True for check in evidence.checks),
+        sum(each.inputs for each in evidence.inputs), sum(each.wrong for each in evidence.inputs),
+    )  # fmt: skip
+    put_line(console, f"{verdict_words(True)}  {held} requirements; {tried} inputs checked, {wrong} wrong")
+    _put_untried(console, evidence)
+    units = verification.derived.valve.recorded_units if verification.derived else AS_COMPUTED
+    if evidence.closed_loop.pressures:
+        _put_loop(console, evidence.closed_loop.pressures, units)
+    put_line(console, verification.verdict)
+
+
+def _put_untried(console: "Console", evidence: "Evidence") -> None:
+    from dzdesign.verify.verification import label_of_untried, untried_requirements
+
+    untried: dict[str, list[str]] = {}
+    for each in untried_requirements(evidence):
+        untried.setdefault(label_of_untried(each), []).append(each.id)
+    for label, ids in untried.items():
+        put_line(console, f"{label}  {', '.join(ids)}")
+
+
+def _put_loop(console: "Console", pressures: "Sequence[PressureResult]", units: "RecordedUnits") -> None:
+    def share(value: float | None) -> str:
+        return "-" if value is None else f"{100 * value:.1f}"
+
+    sides = {each.side for each in pressures}
+    columns: dict[str, Column[PressureResult]] = {"side": lambda each: each.side} if len(sides) > 1 else {}
+    columns |= {
+        f"dP ({units.label('MPa')})": lambda each: units.number(each.dp_MPa, ".2f MPa"),
+        "opens without (%)": lambda each: share(each.dead_zone_opening),
+        "with (%)": lambda each: share(each.residual_opening),
+        f"flow at zero ({units.label('L/min')})": lambda each: each.in_words(each.q_zero_L_min, units),
+        f"largest ({units.label('L/min')})": lambda each: units.number(each.q_max_L_min, ".1f L/min"),
+    }
+    put_rows(console, "Closed loop: dead zone in % of command", pressures, columns, words=())
 
 
 def _put_choices(console: "Console", choices: "Sequence[HysteresisChoice]") -> None:

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from dzdesign import api
 from dzdesign.command_line.cli import main
 from dzdesign.identify.data_quality.catalogue import catalogue
 from dzdesign.identify.valve.model import Warning_
@@ -11,6 +12,7 @@ from dzdesign.terminal import brief
 from dzdesign.terminal.progress import reporting
 from dzdesign.verify import requirements
 from tests.support.designs import designed
+from tests.support.synthetic import needs_compiler
 
 
 @pytest.fixture
@@ -49,6 +51,20 @@ def test_a_warning_of_both_sides_stands_once(example_valve, screen):
     lines = screen(brief.print_valve, replace(example_valve, warnings=warnings))
     (line,) = [each for each in lines if "few-repeats" in each]
     assert "(2)" in line and line.endswith("...") and len(line) <= 80
+
+
+@needs_compiler
+@pytest.mark.slow
+def test_a_verification_fits_one_screen_and_says_what_does_not_hold(example_folder, tmp_path, screen):
+    valve = api.identify(example_folder / "ramps" / "ramp_dP[135]_1.csv.gz", meter_lag="0.1 s", curve="line")
+    api.generate(api.design(valve), target="host", output=tmp_path / "firmware")
+    found = api.verify(tmp_path / "firmware")
+    lines = screen(brief.print_result, found)
+    assert len(lines) + BELOW <= 24 and max(map(len, lines)) <= 80
+    assert any("27" in line and "0 wrong" in line for line in lines)
+    (tmp_path / "firmware" / "core" / "dz_drive.c").unlink()
+    lines = screen(brief.print_result, api.verify(tmp_path / "firmware"))
+    assert any(line.startswith("DOES NOT HOLD") for line in lines)
 
 
 def test_verbose_prints_everything(example_valve, screen, capsys):

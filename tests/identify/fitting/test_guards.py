@@ -253,7 +253,7 @@ def test_verify_holds_the_core_against_the_bounds_of_its_own_guard(tmp_path, mon
     assert main(["design", "valve.json", "--guard", "mean"]) == 0
     assert main(["codegen", "compensator.json", "-o", "firmware"]) == 0
     capsys.readouterr()
-    assert main(["verify", "firmware"]) == 1  # what was not checked is no evidence
+    assert main(["-v", "verify", "firmware"]) == 1  # what was not checked is no evidence
     out = capsys.readouterr().out
     assert "DOES NOT HOLD" not in out
     held = "HOLDS  no over-compensation in the tested pressure range: at every pressure code of the tests the output "
