@@ -22,6 +22,8 @@ ROLES = {"command": "A0", "pressure_a": "A1", "pressure_b": "A2", "current": "A3
 #: With current control: as many codes in a period as there are results beside those of the sample. The interrupt comes
 #: so late that all but one of them are of this period, and its value acts from the next one on.
 CURRENT = CurrentSampling(tick_Hz=PWM_HZ, samples=8, before=7)
+#: Of two shunts each start converts both, so that the results hold half as many of each.
+PAIRED = CurrentSampling(tick_Hz=PWM_HZ, samples=4, before=3)
 CURRENT_ISR_S = Fraction(330, 10**6)  # from CTR = 0 to the interrupt
 CURRENT_READ_S = Fraction(10, 10**6)  # that the interrupt may take to read the codes, latency included
 #: What the projects of both build with, and where TI's Windows installer puts C2000Ware: the user changes this one line
@@ -68,6 +70,7 @@ def c2000_target(
         sample_Hz=SAMPLE_HZ,
         tick_Hz=PWM_HZ,
         current_sampling=CURRENT,
+        paired_sampling=PAIRED,
         templates={f"{name}/{file}": template for file, template in templates.items()}
         | {USER_CODE: "c2000/dz_user.c.jinja"},
         block_templates={f"{name}/{file}": f"{file}.jinja" for file in block_sources},

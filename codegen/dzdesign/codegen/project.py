@@ -21,7 +21,7 @@ from dzdesign.codegen.calibration.files import (
 from dzdesign.codegen.calibration.layout import BuiltFor, CalibrationBlock
 from dzdesign.codegen.calibration.packing import OCTETS, pack
 from dzdesign.codegen.core.certificate_text import zero_command
-from dzdesign.codegen.core.constants import FAULT_BITS, Values
+from dzdesign.codegen.core.constants import Values, current_faults
 from dzdesign.codegen.loading.protocol import LOAD_FILES, STORE, load_context
 from dzdesign.codegen.target import Target, folder_of
 from dzdesign.codegen.vectors import vectors_text
@@ -128,7 +128,7 @@ def generate(
     document = to_json_bytes(compensator)
     digest = sha256_of(document)
     if (drive := compensator.current_drive) is not None:
-        target.check_current_control(drive.sampling)
+        target.check_current_control(drive.sampling, drive.loop.shunts)
     banner, block = banner_of(compensator, digest), None
     if calibration == "block":
         block = block_of(compensator, digest)
@@ -204,7 +204,7 @@ def target_files(
         "loads": block is not None and target.link is not None,
         "link_sources": link_names(target, ".c") if block else (),
         "link_headers": link_names(target, ".h") if block else (),
-        "current_faults": FAULT_BITS,
+        "current_faults": current_faults(two=len(signals.signs) == 2),
         "wiring": wiring_of(compensator, Converter(full_V=full_V, levels=levels)),
         "firmware_origin": f"0x{banner.digest[:4].upper()}",
         "lot_setting": banner.lot,

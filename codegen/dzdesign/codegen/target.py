@@ -65,6 +65,8 @@ class Target:
     has_timer: bool = True
     #: When its files sample the current of a solenoid that they control; None where they do not.
     current_sampling: CurrentSampling | None = None
+    #: The same where each of two solenoids has a shunt.
+    paired_sampling: CurrentSampling | None = None
     #: Output paths of the files that are the user's to fill in; the rest is generated again as it is.
     board: frozenset[str] = frozenset()
     #: Where a calibration block has a flash sector of its own.
@@ -139,19 +141,20 @@ class Target:
             sample_Hz=self.sample_Hz,
             tick_Hz=self.tick_Hz,
             current_sampling=self.current_sampling,
+            paired_sampling=self.paired_sampling,
             crystal_Hz=self.crystal_Hz,
             channels=self.channels,
         )
 
-    def check_current_control(self, sampling: CurrentSampling) -> None:
+    def check_current_control(self, sampling: CurrentSampling, shunts: int = 1) -> None:
         """Refuse a compensator with current control where the target's files have none, or sample at other times."""
-        if self.current_sampling is None:
+        ours = self.inputs().sampling_of(shunts)
+        if ours is None:
             raise InputError(
                 f"the compensator controls the current, but the files of target {self.name} do not; "
                 "design it again with --drive duty, or for another target"
             )
-        if sampling != self.current_sampling and not self.takes_any_signals:
-            ours = self.current_sampling
+        if sampling != ours and not self.takes_any_signals:
             raise InputError(
                 f"the compensator's current loop is for {sampling.samples} samples a PWM period, {sampling.before} of "
                 f"them before the interrupt, but target {self.name} takes {ours.samples} and {ours.before}; "

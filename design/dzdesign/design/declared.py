@@ -23,6 +23,8 @@ from dzdesign.design.target_inputs import TargetInputs
 #: Options that only current control has a use for, and those that it needs.
 OF_CURRENT = ("coil", "rated_current", "current_signal", "supply_signal", "current_error", "bench_current")
 NEEDED = ("coil", "rated_current", "supply", "current_signal")
+#: Behind the signal of the current: each of two solenoids has a shunt.
+EACH = " each"
 #: Of the ends of a sensor's range: that of the decimal numbers in them.
 ROUNDING = 1e-9
 #: Supplies of machines, V.
@@ -36,13 +38,17 @@ CURRENT_CODES = 2
 FURTHER = ("pressure_error", "bench_pressure_error", "pressure_converter", "oil", "ageing")
 
 
-def current_request(text: Mapping[str, str], read: Mapping[str, Any], target: TargetInputs) -> CurrentRequest | None:
+def current_request(
+    text: Mapping[str, str], read: Mapping[str, Any], target: TargetInputs, signals: Signals
+) -> CurrentRequest | None:
     """Return what is declared for current control; None for a drive by duty. Options come as texts and as read."""
     if text["drive"] == "duty":
         if useless := [flag_of(name) for name in OF_CURRENT if text[name]]:
             raise InputError(f"{useless[0]} is for --drive current, but --drive is duty; give --drive current")
         return None
-    if target.current_sampling is None:
+    shunts, solenoids = 1 + text["current_signal"].endswith(EACH), len(signals.signs)
+    sampling = target.sampling_of(shunts)
+    if sampling is None:
         raise InputError(f"the files of target {target.name} sample no current; give --drive duty, or another --target")
     if missing := [flag_of(name) for name in NEEDED if not text[name]]:
         raise InputError(
@@ -55,7 +61,12 @@ def current_request(text: Mapping[str, str], read: Mapping[str, Any], target: Ta
         circuit = CoilCircuit(rated_A=read["rated_current"], supply_V=read["supply"], **read["coil"])
     except RuleError as error:
         raise InputError(f"--coil, --rated-current and --supply: {error}") from error
-    sensor = parse_signal(text["current_signal"], "--current-signal")
+    if shunts > solenoids:
+        raise InputError(
+            f"--current-signal is {quoted(text['current_signal'])}, but a command of one sign drives one solenoid; "
+            f"leave out '{EACH.strip()}'"
+        )
+    sensor = parse_signal(text["current_signal"].removesuffix(EACH), "--current-signal")
     sensor.check_within(target.converter)
     _check_measured(sensor, "--current-signal", "A", OVER_SHARE * circuit.rated_A)
     supply = parse_signal(text["supply_signal"], "--supply-signal") if text["supply_signal"] else None
@@ -68,8 +79,10 @@ def current_request(text: Mapping[str, str], read: Mapping[str, Any], target: Ta
             offset_V=float(sensor.offset_V),
             supply_divider=float(supply.volts_per_unit) if supply else 0.0,
         ),
-        sampling=target.current_sampling,
+        sampling=sampling,
         converter=target.converter,
+        solenoids=solenoids,
+        shunts=shunts,
     )
 
 

@@ -150,7 +150,7 @@ def _crystal(text: str, option: str) -> int:
 def _channels(text: str, option: str) -> tuple[str, ...]:
     """Read the names of the converter's channels: of command, pressure A and pressure B, then of current and supply."""
     names = tuple(text.upper().replace(",", " ").split())
-    if not 3 <= len(names) <= 5 or len(set(names)) < len(names) or not all(map(CHANNEL.fullmatch, names)):
+    if not 3 <= len(names) <= 6 or len(set(names)) < len(names) or not all(map(CHANNEL.fullmatch, names)):
         raise InputError(
             f"{option} is {quoted(text)}, expected the channels of command, pressure A and pressure B (then of the "
             "current and the supply, where they are read), each once, such as 'A0 A1 A2'"
@@ -186,7 +186,7 @@ class DesignChoices:
 
     drive: Annotated[Text, Option("D", DRIVE, "duty", choices=DRIVES)] = None
     """Output of the law. duty: the PWM's share of the supply voltage. current: the set point of a current loop in the
-    firmware, for one solenoid, with the rated current as full drive."""
+    firmware, with the rated current as full drive."""
     coil: Annotated[Text, Option("C", DRIVE, example="3.5 ohm 40 mH", read=_coil)] = None
     """Coil for --drive current, such as "3.5 ohm 40 mH". The form "3.5 + 0.5 ohm x 0.75..1.35, 40 mH x 0.5..1.5" adds
     the resistance of switch and shunt and the ranges, here with their defaults."""
@@ -194,7 +194,8 @@ class DesignChoices:
     """Current at full drive, for --drive current."""
     current_signal: Annotated[Text, Option("S", DRIVE, example="0..1.2 A on 2 ohm + 0.15 V")] = None
     """Signal of the current sensor at the converter, for --drive current, such as "0..1.2 A on 2 ohm + 0.15 V". The
-    resistance is that of the shunt times its amplifier's gain, and the voltage is the one without current."""
+    resistance is that of the shunt times its amplifier's gain, and the voltage is the one without current. With two
+    solenoids it is of one shunt for both, or with "each" behind it of one shunt for each."""
     supply_signal: Annotated[Text, Option("S", DRIVE, example="0..36 V x 0.075")] = None
     """Signal of the supply voltage at the converter, for --drive current, such as "0..36 V x 0.075" (default: not
     measured). Measuring it makes the current loop faster."""
@@ -284,7 +285,8 @@ class DesignChoices:
     fastest clock that it allows. Target f280049c takes the clock of TI's device.h."""
     channels: Annotated[Text, Option("C", BOARD, example="A0 A1 A2", read=_channels)] = None
     """Channels of the converter for command, pressure A and pressure B, of the targets f28335 and f280049c (default:
-    "A0 A1 A2"). With --drive current those of the current and of a measured supply follow (default: "A3 A4")."""
+    "A0 A1 A2"). With --drive current those of the current, of two shunts one each, and of a measured supply
+    follow (default: "A3 A4", and A5 for a second shunt)."""
     ramp_up: Annotated[Text, Option("T", DRIVE, "0 s", example="0.5 s", read=_times)] = None
     """Time from zero to full command, such as "0.5 s", or "0.5 s / 0.8 s" for positive and negative commands."""
     ramp_down: Annotated[Text, Option("T", DRIVE, "0 s", example="0.5 s", read=_times)] = None

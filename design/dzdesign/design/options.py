@@ -225,9 +225,9 @@ def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
             )
     if text["hysteresis"] == "play" and read["transition"] == 0:
         raise InputError("--hysteresis play begins in the transition, but --transition is off; leave out one")
-    current = current_request(text, read, target)
+    current = current_request(text, read, target, signals)
     if (channels := read["channels"]) and len(channels) != (
-        expected := 3 + bool(current) + bool(text["supply_signal"])
+        expected := 3 + (current.shunts if current else 0) + bool(text["supply_signal"])
     ):
         raise InputError(f"--channels names {len(channels)} channels, expected {expected} of these inputs")
     return DesignOptions(

@@ -306,7 +306,7 @@ def _sides(compensator):
 @pytest.mark.parametrize(
     ("change", "named"),
     [
-        ({"shape": 1 << 5}, "shape"),
+        ({"shape": 1 << 6}, "shape"),
         ({"sample_Hz": 0}, "rates"),
         ({"compare_max": 0}, "rates"),
         ({"beta_step": 0}, "step of beta"),

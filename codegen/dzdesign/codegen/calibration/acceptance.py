@@ -74,7 +74,7 @@ def refusals(block: CalibrationBlock, built: BuiltFor) -> dict[str, tuple[str, .
     Law and drive functions count with the codes: of codes out of order they are not judged.
     """
     groups = {
-        "FORMAT": _format(block),
+        "FORMAT": _format(block, built),
         "FIRMWARE": _firmware(block, built),
         "SIGNALS": _signals(block, built),
         "LAW": _law(block, built),
@@ -86,11 +86,12 @@ def refusals(block: CalibrationBlock, built: BuiltFor) -> dict[str, tuple[str, .
     return {name: failed for name, failed in found.items() if failed and name not in unjudged}
 
 
-def _format(block: CalibrationBlock) -> Rules:
+def _format(block: CalibrationBlock, built: BuiltFor) -> Rules:
     yield "magic", block.magic == int.from_bytes(MAGIC, "little")
     yield "layout", block.layout == LAYOUT
     yield "length", block.length == LENGTH_WORDS
-    yield "unused words are 0", not (block.reserved or block.current.spare or any(side.spare for side in block.sides))
+    held = 0 if built.has("BIPOLAR") and built.has("CURRENT") else block.current.held_ticks
+    yield "unused words are 0", not (block.reserved or held or any(side.spare for side in block.sides))
 
 
 def _firmware(block: CalibrationBlock, built: BuiltFor) -> Rules:
@@ -183,7 +184,7 @@ def _current(current: CurrentBlock, built: BuiltFor) -> Rules:
     c = current
     yield "samples", c.samples == built.samples
     yield "limit of the current controller", c.compare_limit <= built.compare_max
-    yield "rate and ticks", min(c.rate, c.over_ticks, c.open_ticks) >= 1
+    yield "rate and ticks", min(c.rate, c.over_ticks, c.open_ticks, c.held_ticks or not built.has("BIPOLAR")) >= 1
     yield "shifts", 1 <= c.current_shift <= LARGEST_CURRENT_SHIFT and 1 <= c.gain_shift <= LARGEST_GAIN_SHIFT
     yield "gains", max(c.proportional, c.integral, c.feed_forward) <= LARGEST_GAIN and c.current_gain >= 1
     largest = (c.short_sum * c.current_gain + (1 << c.current_shift >> 1)) >> c.current_shift

@@ -43,6 +43,7 @@ def built_for(compensator: Compensator, *, fixed: bool = False) -> BuiltFor:
         "SWAPPED": signals.swapped and compensator.negative is not None,
         "CURRENT": drive is not None,
         "SUPPLY": drive is not None and drive.loop.supply is not None,
+        "SHUNTS": drive is not None and drive.loop.shunts == 2,
     }
     return BuiltFor(
         shape=sum(holds[name] << place for place, name in enumerate(SHAPE_BITS)),

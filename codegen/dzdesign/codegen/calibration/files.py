@@ -36,6 +36,7 @@ from dzdesign.codegen.core.certificate_text import (
 )
 from dzdesign.codegen.core.constants import (
     LITERALS,
+    OF_B,
     Define,
     Values,
     c_comment,
@@ -122,6 +123,7 @@ def _form(built: BuiltFor) -> Values:
         "numbers": "const struct dz_calibration *block = &dz_valve;",
         "bipolar": built.has("BIPOLAR"),
         "swapped": built.has("SWAPPED"),
+        "shunts": built.has("SHUNTS"),
     }
 
 
@@ -220,7 +222,9 @@ def _constants(built: BuiltFor, numbers: CalibrationBlock | None) -> dict[str, l
     ]  # fmt: skip
     if built.has("CURRENT"):
         found["dz_current.c"] = [_limit("SHIFT_MASK", 15, "plain", "mask of a shift")]
-        found["dz_current.h"] = current_fault_bits()
+        found["dz_current.h"] = current_fault_bits(two=built.has("BIPOLAR"))
+    if built.has("CURRENT") and built.has("BIPOLAR"):
+        found["dz_current.c"].append(_limit("OF_B", OF_B, "plain", "places by which faults of solenoid B stand higher"))
     if built.has("CURRENT") and numbers is not None:
         offset = Define(symbol="DZ_CURRENT_OFFSET_TICKS", value=1 << numbers.current.offset_shift,
                         equation="sums that the offset is the mean of", engineering="with the output off")  # fmt: skip
@@ -265,7 +269,7 @@ def _declarations(kind: type, built: BuiltFor) -> Iterator[str]:
     """Yield the lines of a struct's members, each with its comment."""
     own = entries(kind)
     for name in kind.__dataclass_fields__:  # type: ignore[attr-defined]
-        if name in own and not (built.fixed and own[name].of_block):
+        if name in own and built.keeps(own[name]):
             yield from c_comment(_comment(own[name]))
             yield f"{_declared(name, own[name])};"
         elif name == "sides":

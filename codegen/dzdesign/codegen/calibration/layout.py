@@ -25,6 +25,7 @@ SHAPE_BITS = {
     "SWAPPED": "the pressure drop of negative commands is B less A",
     "CURRENT": "the drive's output is the set point of a current",
     "SUPPLY": "the supply's voltage is measured",
+    "SHUNTS": "each of two solenoids has a shunt",
 }
 #: `interlock` where the drive waits for no zero command.
 NO_INTERLOCK = 0xFFFF
@@ -48,6 +49,8 @@ class Words:
     rounding: str = "exact"
     #: Whether only a block has it, to be recognised, checked and displayed: no arithmetic reads it.
     of_block: bool = False
+    #: Whether only two solenoids have it.
+    of_two: bool = False
 
     @property
     def words(self) -> int:
@@ -167,7 +170,10 @@ class CurrentBlock:
         "nominal over measured supply times 2^14, from supply_low on", "", f"{_LOOP}.supply.nodes", count=SUPPLY_NODES,
         rounding=_NEAREST,
     )  # fmt: skip
-    spare: int = _shown("0", value=0)
+    held_ticks: int = _words(
+        "PWM periods in a row with a current in a solenoid that is held off that are a fault; 0 with one solenoid",
+        key=f"{_LOOP}.held_ticks", of_two=True,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -289,6 +295,10 @@ class BuiltFor:
     def has(self, name: str) -> bool:
         """Tell whether the shape has a bit of `SHAPE_BITS`."""
         return bool(self.shape >> list(SHAPE_BITS).index(name) & 1)
+
+    def keeps(self, entry: Words) -> bool:
+        """Tell whether the C struct has an entry: every block has each, a firmware with its numbers what it reads."""
+        return not self.fixed or not (entry.of_block or (entry.of_two and not self.has("BIPOLAR")))
 
 
 class Member(NamedTuple):

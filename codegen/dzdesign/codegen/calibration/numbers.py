@@ -49,7 +49,7 @@ class ValvePage:
         within = ""
         for path, _, entry in members():
             place, _, name = path.rpartition(".")
-            if place not in parts or (entry.of_block and self.built.fixed):
+            if place not in parts or not self.built.keeps(entry):
                 continue
             if place != within:
                 lines += [*CLOSES[within][: 1 if place == "sides[1]" else None], *OPENS[place]]
@@ -220,6 +220,7 @@ class ValvePage:
             "integral": f"{loop.integral / unit:.6g}",
             "feed_forward": f"{loop.feed_forward / unit:.6g}: R i over the supply",
             "offset_shift": f"{1 << loop.offset_shift} sums",
+            "held_ticks": "" if loop.held_ticks else "one solenoid",
             "supply_shift": f"{loop.supply.step_codes} codes" if loop.supply else "not measured",
         }
 

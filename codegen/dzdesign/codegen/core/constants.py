@@ -87,6 +87,9 @@ FAULT_BITS = {
     "SHORT": "the current is beyond the converter's range",
     "OVER": "the current stayed above its limit",
 }
+#: The one that only two solenoids have; and by how many places those of solenoid B stand higher.
+HELD_BIT = {"HELD": "a current in the solenoid that is held off: its switch does not open"}
+OF_B = 8
 
 
 def status_constants() -> list[Define]:
@@ -101,9 +104,15 @@ def drive_status_constants(*, block: bool) -> list[Define]:
                    "the drive's status word")]  # fmt: skip
 
 
-def current_fault_bits() -> list[Define]:
+def current_faults(*, two: bool) -> dict[str, str]:
+    """Return the faults of a controller of one solenoid, or of two, in the order of their bits."""
+    return FAULT_BITS | (HELD_BIT if two else {})
+
+
+def current_fault_bits(*, two: bool) -> list[Define]:
     """Return the bits of the controller's word of faults."""
-    return [*_bits("DZ_CURRENT", ((place, *each) for place, each in enumerate(FAULT_BITS.items())), "the faults")]
+    bits = enumerate(current_faults(two=two).items())
+    return [*_bits("DZ_CURRENT", ((place, *each) for place, each in bits), "the faults")]
 
 
 def difference_place() -> Define:

@@ -193,7 +193,7 @@ class HardwareRuns:
                 if model:
                     model.tick()
                 set_points = (model.compare_a, model.compare_b) if model else (0, 0)
-                yield codes, (current.tick(set_points[0]) if current else set_points[0]), set_points[1]
+                yield codes, *(current.tick(*set_points) if current else set_points)
                 fresh = False
 
 

@@ -148,7 +148,10 @@ static inline void run(const struct task *task, struct plant *plant, double *rec
                 compare = (uint16_t)waved(task, direct, k * task->every + j, plant->counts);
             }
             if (task->coil != NULL) {
-                plant_period_of_current(plant, coil_period(&coil, compare) / task->coil->rated_A);
+                const uint16_t set_points[2] = {task->negative ? 0u : compare, task->negative ? compare : 0u};
+
+                coil_period(&coil, set_points);
+                plant_period_of_current(plant, coil.means_A[task->negative] / task->coil->rated_A);
             } else {
                 plant_period(plant, (in_force < plant->counts) ? in_force : plant->counts);
             }
