@@ -128,7 +128,7 @@ def generate(
     document = to_json_bytes(compensator)
     digest = sha256_of(document)
     if (drive := compensator.current_drive) is not None:
-        target.check_current_control(drive.sampling, drive.loop.shunts)
+        target.check_current_control(drive.sampling)
     banner, block = banner_of(compensator, digest), None
     if calibration == "block":
         block = block_of(compensator, digest)
@@ -200,6 +200,7 @@ def target_files(
         "core_sources": core_sources(block=block is not None, current=current is not None),
         "core_headers": core_headers(block=block is not None, current=current is not None),
         **block_values(compensator, block, target),
+        **target.channel_values(roles_of(compensator)),
         "current": current,
         "loads": block is not None and target.link is not None,
         "link_sources": link_names(target, ".c") if block else (),
@@ -226,6 +227,17 @@ def target_files(
         for path, template in {**target.templates, **in_block_form}.items()
     }
     return files | (_load_files(target, banner) if block and target.link else {})
+
+
+def roles_of(compensator: Compensator) -> tuple[str, ...]:
+    """Return what the converter reads, in the order of the declared channels."""
+    drive = compensator.current_drive
+    there = {
+        "current": drive is not None,
+        "current_b": drive is not None and drive.loop.shunts == 2,
+        "supply": drive is not None and drive.loop.supply is not None,
+    }
+    return ("command", "pressure_a", "pressure_b", *(role for role, is_there in there.items() if is_there))
 
 
 def _load_files(target: Target, banner: Banner) -> dict[str, str]:

@@ -65,17 +65,18 @@ class Target:
     has_timer: bool = True
     #: When its files sample the current of a solenoid that they control; None where they do not.
     current_sampling: CurrentSampling | None = None
-    #: The same where each of two solenoids has a shunt.
-    paired_sampling: CurrentSampling | None = None
     #: Output paths of the files that are the user's to fill in; the rest is generated again as it is.
     board: frozenset[str] = frozenset()
     #: Where a calibration block has a flash sector of its own.
     sector: FlashSector | None = None
     #: The serial line of its telemetry, if it sends any.
     link: Link | None = None
-    #: Declared of the board: its crystal, and the converter's channels in the order of `c2000.ROLES`.
+    #: Declared of the board: its crystal, and the converter's channels in the order of what it reads.
     crystal_Hz: int | None = None
     channels: tuple[str, ...] = ()
+    #: The converter's channels in the order of their numbers; and of what it reads that where none is declared.
+    known_channels: tuple[str, ...] = ()
+    channel_of_role: Mapping[str, str] = field(default_factory=dict)
     #: What makes this target on a declared board; None where a board has nothing that these files would know.
     of_board: Callable[[int | None, Sequence[str]], "Target"] | None = None
 
@@ -132,6 +133,16 @@ class Target:
         except DzdesignError as error:
             raise InputError(f"--crystal: {self.name} can't be clocked by it: {error}") from error
 
+    def channel_values(self, roles: Sequence[str]) -> dict[str, str]:
+        """Return name and number of the channel of each of these roles, printed; nothing without a converter."""
+        if not self.channel_of_role:
+            return {}
+        channels = self.channels or [self.channel_of_role[role] for role in roles]
+        names = dict(zip(roles, channels, strict=True))
+        return {f"{role}_channel": f"ADCIN{name}" for role, name in names.items()} | {
+            f"{role}_number": str(self.known_channels.index(name)) for role, name in names.items()
+        }
+
     def inputs(self) -> TargetInputs:
         """Return the converter and timer that a compensator for this target is designed for."""
         return TargetInputs(
@@ -141,15 +152,13 @@ class Target:
             sample_Hz=self.sample_Hz,
             tick_Hz=self.tick_Hz,
             current_sampling=self.current_sampling,
-            paired_sampling=self.paired_sampling,
             crystal_Hz=self.crystal_Hz,
             channels=self.channels,
         )
 
-    def check_current_control(self, sampling: CurrentSampling, shunts: int = 1) -> None:
+    def check_current_control(self, sampling: CurrentSampling) -> None:
         """Refuse a compensator with current control where the target's files have none, or sample at other times."""
-        ours = self.inputs().sampling_of(shunts)
-        if ours is None:
+        if (ours := self.current_sampling) is None:
             raise InputError(
                 f"the compensator controls the current, but the files of target {self.name} do not; "
                 "design it again with --drive duty, or for another target"

@@ -46,9 +46,7 @@ def current_request(
         if useless := [flag_of(name) for name in OF_CURRENT if text[name]]:
             raise InputError(f"{useless[0]} is for --drive current, but --drive is duty; give --drive current")
         return None
-    shunts, solenoids = 1 + text["current_signal"].endswith(EACH), len(signals.signs)
-    sampling = target.sampling_of(shunts)
-    if sampling is None:
+    if target.current_sampling is None:
         raise InputError(f"the files of target {target.name} sample no current; give --drive duty, or another --target")
     if missing := [flag_of(name) for name in NEEDED if not text[name]]:
         raise InputError(
@@ -61,6 +59,7 @@ def current_request(
         circuit = CoilCircuit(rated_A=read["rated_current"], supply_V=read["supply"], **read["coil"])
     except RuleError as error:
         raise InputError(f"--coil, --rated-current and --supply: {error}") from error
+    shunts, solenoids = 1 + text["current_signal"].endswith(EACH), len(signals.signs)
     if shunts > solenoids:
         raise InputError(
             f"--current-signal is {quoted(text['current_signal'])}, but a command of one sign drives one solenoid; "
@@ -79,7 +78,7 @@ def current_request(
             offset_V=float(sensor.offset_V),
             supply_divider=float(supply.volts_per_unit) if supply else 0.0,
         ),
-        sampling=sampling,
+        sampling=target.current_sampling,
         converter=target.converter,
         solenoids=solenoids,
         shunts=shunts,

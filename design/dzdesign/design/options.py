@@ -126,8 +126,6 @@ class DesignOptions:
         """Return the current control that is asked for, its loop chosen."""
         if self.current is None:
             return None
-        if len(self.signals.signs) == 2:
-            raise InputError("--drive current is for one solenoid, but the command has both signs; give --drive duty")
         dither = (self._dither_counts(), self._dither_ticks())
         return design_current_drive(self.current, self.signals.compare_max, dither)
 

@@ -85,8 +85,6 @@ class TargetInputs:
     """PWM frequency."""
     current_sampling: CurrentSampling | None = None
     """Sampling times of the solenoid's current; null if it is not sampled."""
-    paired_sampling: CurrentSampling | None = None
-    """The same where each of two solenoids has a shunt; null if that is not sampled."""
     crystal_Hz: Annotated[int, quantity("Hz", ge=1, le=10**9)] | None = None
     """Declared frequency of the board's crystal or oscillator; null if none is declared."""
     channels: tuple[str, ...] = ()
@@ -94,15 +92,11 @@ class TargetInputs:
     none are declared."""
 
     def __post_init__(self) -> None:
-        for sampling in (self.current_sampling, self.paired_sampling):
-            if sampling and sampling.tick_Hz != self.tick_Hz:
-                raise RuleError(
-                    f"the current is sampled in {sampling.tick_Hz} PWM periods a second, expected {self.tick_Hz}"
-                )
-
-    def sampling_of(self, shunts: int) -> CurrentSampling | None:
-        """Return when the current of one shunt, or of two, is sampled; None where it is not."""
-        return self.paired_sampling if shunts == 2 else self.current_sampling
+        if self.current_sampling and self.current_sampling.tick_Hz != self.tick_Hz:
+            raise RuleError(
+                f"the current is sampled in {self.current_sampling.tick_Hz} PWM periods a second, expected "
+                f"{self.tick_Hz}"
+            )
 
 
 #: Largest error of the command that is believed, codes of any converter.

@@ -223,7 +223,7 @@ def test_start_up_order_and_watchdog():
         (TWO, HARDWARE, "DZ_PWM_B.TZCLR.bit.OST = 1u;", "", check_both_outputs),
         (TWO, "dz_isr.c", "dz_drive_tick(&drive);", "if (fresh) { dz_drive_tick(&drive); }", check_drive_calls),
         (TWO, "dz_isr.c", "            if (fresh != 0u)", "            if (fresh <= 1u)", check_drive_calls),
-        (TWO, "dz_isr.c", "        if (dz_state.released != 0u)", "        if (dz_state.ticks != 0u)",
+        (TWO, "dz_isr.c", "        if (state.released != 0u)", "        if (state.ticks != 0u)",
          check_delayed_start),
         (PLAIN, HARDWARE, "SOCBSEL = ET_CTRU_CMPA", "SOCBSEL = ET_CTR_ZERO", of_current("sampling")),
         (PLAIN, HARDWARE, "ETPS.bit.SOCBPRD = ET_1ST", "ETPS.bit.SOCBPRD = ET_2ND", of_current("sampling")),

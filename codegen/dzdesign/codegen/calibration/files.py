@@ -226,8 +226,9 @@ def _constants(built: BuiltFor, numbers: CalibrationBlock | None) -> dict[str, l
     if built.has("CURRENT") and built.has("BIPOLAR"):
         found["dz_current.c"].append(_limit("OF_B", OF_B, "plain", "places by which faults of solenoid B stand higher"))
     if built.has("CURRENT") and numbers is not None:
-        offset = Define(symbol="DZ_CURRENT_OFFSET_TICKS", value=1 << numbers.current.offset_shift,
-                        equation="sums that the offset is the mean of", engineering="with the output off")  # fmt: skip
+        sums = (1 + built.has("SHUNTS")) << numbers.current.offset_shift
+        offset = Define(symbol="DZ_CURRENT_OFFSET_TICKS", value=sums, equation="sums of the offset's calibration",
+                        engineering="with the output off")  # fmt: skip
         found["dz_current.h"].insert(0, offset)
     if built.has("SUPPLY"):
         found["dz_current.c"] += [
@@ -364,7 +365,7 @@ def block_values(compensator: Compensator, block: CalibrationBlock | None, targe
         "block_headers": (BLOCK_HEADER,) if block else (),
         "block_lines": lines,
         "command_zero": "dz_block.command_zero" if block else "DZ_DRIVE_COMMAND_ZERO",
-        "offset_ticks": f"{1 << current.loop.offset_shift}u" if block and current else "DZ_CURRENT_OFFSET_TICKS",
+        "offset_ticks": f"{current.loop.offset_ticks}u" if block and current else "DZ_CURRENT_OFFSET_TICKS",
         "sector": sector is not None,
     }
     if sector:

@@ -171,7 +171,7 @@ class CurrentBlock:
         rounding=_NEAREST,
     )  # fmt: skip
     held_ticks: int = _words(
-        "PWM periods in a row with a current in a solenoid that is held off that are a fault; 0 with one solenoid",
+        "PWM periods with a current after the other solenoid was asked for that are a fault; 0 with one solenoid",
         key=f"{_LOOP}.held_ticks", of_two=True,
     )  # fmt: skip
 

@@ -88,7 +88,7 @@ FAULT_BITS = {
     "OVER": "the current stayed above its limit",
 }
 #: The one that only two solenoids have; and by how many places those of solenoid B stand higher.
-HELD_BIT = {"HELD": "a current in the solenoid that is held off: its switch does not open"}
+HELD_BIT = {"HELD": "the current does not end as the other solenoid is asked for: the switch does not open"}
 OF_B = 8
 
 

@@ -46,7 +46,6 @@ TARGET = Target(
     converter=Converter(full_V=ADC_SPAN_V, levels=2**ADC_BITS),
     takes_any_signals=True,
     current_sampling=CurrentSampling(),
-    paired_sampling=CurrentSampling(),
     templates={f"{FOLDER}/{file}": f"{file}.jinja" for file in OWN_FILES + OTHER_FILES}
     | {f"{FOLDER}/{file}": f"c2000/{file}.jinja" for file in SHARED_FILES},
     board=frozenset(f"{FOLDER}/{file}" for file in BOARD_FILES),

@@ -13,7 +13,6 @@ TARGET = Target(
     compare_max=60_000,
     takes_any_signals=True,
     current_sampling=CurrentSampling(),
-    paired_sampling=CurrentSampling(),
     has_timer=False,
     templates={f"host/{file}": f"{file}.jinja" for file in (*FILES, *OTHER_FILES)},
     context={},

@@ -224,9 +224,11 @@ class CurrentLoop:
     open_ticks: Annotated[int, Meta(ge=1, le=65535)]
     """Consecutive PWM periods without an expected current that make a fault."""
     held_ticks: Count = 0
-    """Consecutive PWM periods with a current in a solenoid that is held off that make a fault; 0 with one solenoid."""
+    """Consecutive PWM periods with a current after the other solenoid was asked for that make a fault; 0 with one
+    solenoid."""
     shunts: Annotated[int, Meta(ge=1, le=2)] = 1
-    """Number of shunts: 1 if the current of either solenoid passes the same one."""
+    """Number of shunts: 1 if the current of either solenoid passes the same one. Of two that of the solenoid in use is
+    sampled."""
     supply: SupplyCorrection | None = None
     """Correction for the supply voltage, if it is measured."""
 
@@ -256,6 +258,11 @@ class CurrentLoop:
     def two(self) -> bool:
         """Whether it has two solenoids, of which it drives one at a time."""
         return self.held_ticks > 0 or self.shunts == 2
+
+    @property
+    def offset_ticks(self) -> int:
+        """PWM periods in which the offset of each shunt is calibrated."""
+        return self.shunts << self.offset_shift
 
     @property
     def largest_current(self) -> int:

@@ -11,64 +11,71 @@
 
 volatile struct dz_state dz_state;
 
-/* Private to the interrupt; what others may read is copied to dz_state. */
+/* Private to the interrupt; what others may read is copied to dz_state at its end. */
+static struct dz_state state;
 static struct dz_drive drive;
 
 static uint16_t take_sample(void);
-static void show_drive(void);
+static void show(void);
 static void force_output_low(void);
 static void release_output(void);
 
 void dz_isr_init(uint16_t faults)
 {
-    dz_state.ticks = 0u;
-    dz_state.ticks_without_sample = 0u;
-    dz_state.released = 0u;
-    dz_state.fault = faults;
-    dz_state.u_adc = 0u;
-    dz_state.p_a_adc = 0u;
-    dz_state.p_b_adc = 0u;
+    static const struct dz_state nothing; /* all zero */
+
+    state = nothing;
+    state.fault = faults;
     dz_drive_init(&drive);
-    show_drive();
+    show();
 }
 
-static void show_drive(void)
+static void show(void)
 {
-    dz_state.compare_a = drive.compare_a;
-    dz_state.compare_b = drive.compare_b;
-    dz_state.side = drive.side;
-    dz_state.status = drive.status;
+    state.compare_a = drive.compare_a;
+    state.compare_b = drive.compare_b;
+    state.side = drive.side;
+    state.status = drive.status;
+    dz_state = state;
 }
 
-/* 1 if finished conversions with 12-bit codes were there, 0 otherwise. */
+/* 1 if finished conversions with 12-bit codes were there, 0 otherwise: for too long a time that is a fault. */
 static uint16_t take_sample(void)
 {
     uint16_t codes[DZ_SAMPLE_CODES];
+    uint16_t fresh = dz_read_sample(codes);
     uint16_t at;
 
-    if (dz_read_sample(codes) == 0u)
+    for (at = 0u; (fresh != 0u) && (at < DZ_SAMPLE_CODES); at++)
     {
-        return 0u;
+        fresh = (codes[at] <= DZ_ADC_CODE_MAX) ? 1u : 0u; /* no 12-bit converter says more: not a sample */
     }
-    for (at = 0u; at < DZ_SAMPLE_CODES; at++)
+    if (fresh != 0u)
     {
-        if (codes[at] > DZ_ADC_CODE_MAX)
+        state.u_adc = codes[0];
+        state.p_a_adc = codes[1];
+        state.p_b_adc = codes[2];
+        state.ticks_without_sample = 0u;
+    }
+    else
+    {
+        if (state.ticks_without_sample < DZ_SAMPLE_TIMEOUT_TICKS)
         {
-            return 0u; /* no 12-bit converter says that: not a sample */
+            state.ticks_without_sample++;
+        }
+        if (state.ticks_without_sample >= DZ_SAMPLE_TIMEOUT_TICKS)
+        {
+            state.fault |= DZ_FAULT_NO_SAMPLE;
         }
     }
-    dz_state.u_adc = codes[0];
-    dz_state.p_a_adc = codes[1];
-    dz_state.p_b_adc = codes[2];
-    return 1u;
+    return fresh;
 }
 
 static void force_output_low(void)
 {
     dz_trip_output();
-    dz_state.released = 0u;
+    state.released = 0u;
     dz_drive_init(&drive);
-    show_drive();
     dz_write_compare_a(0u);
     dz_write_compare_b(0u);
 }
@@ -78,59 +85,45 @@ static void release_output(void)
 {
     dz_drive_init(&drive);
     dz_untrip_output();
-    dz_state.released = 1u;
+    state.released = 1u;
 }
 
 void dz_isr(void)
 {
     const uint16_t fresh = take_sample();
 
-    dz_state.ticks++;
-    if (fresh != 0u)
+    state.ticks++;
+    if ((state.released != 0u) && (dz_output_tripped() != 0u))
     {
-        dz_state.ticks_without_sample = 0u;
-    }
-    else if (dz_state.ticks_without_sample < DZ_SAMPLE_TIMEOUT_TICKS)
-    {
-        dz_state.ticks_without_sample++;
-    }
-    else
-    {
-        /* the count stays at its limit */
+        state.fault |= DZ_FAULT_TRIP_INPUT;
     }
 
-    if ((dz_state.released != 0u) && (dz_output_tripped() != 0u))
-    {
-        dz_state.fault |= DZ_FAULT_TRIP_INPUT;
-    }
-    if (dz_state.ticks_without_sample >= DZ_SAMPLE_TIMEOUT_TICKS)
-    {
-        dz_state.fault |= DZ_FAULT_NO_SAMPLE;
-    }
-
-    if (dz_state.fault != 0u)
+    if (state.fault != 0u)
     {
         force_output_low();
     }
     else
     {
-        /* The start waits until the trip input is high: that is not a fault. */
-        if ((dz_state.released == 0u) && (fresh != 0u) && (dz_trip_inputs_high() != 0u))
+        if (state.released == 0u)
         {
-            release_output();
+            /* The start waits until the trip input is high: that is not a fault. */
+            if ((fresh != 0u) && (dz_trip_inputs_high() != 0u))
+            {
+                release_output();
+            }
         }
-        if (dz_state.released != 0u)
+        if (state.released != 0u)
         {
             if (fresh != 0u)
             {
-                dz_drive_sample(&drive, dz_state.u_adc, dz_state.p_a_adc, dz_state.p_b_adc);
+                dz_drive_sample(&drive, state.u_adc, state.p_a_adc, state.p_b_adc);
             }
             /* Each tick, for the dither; between two samples the law's value is held. */
             dz_drive_tick(&drive);
-            show_drive();
             dz_write_compare_a(drive.compare_a);
             dz_write_compare_b(drive.compare_b);
         }
     }
+    show();
     dz_interrupt_done();
 }

@@ -33,7 +33,6 @@ static uint16_t command_at(uint32_t tick)
 {
     return (tick < 6u) ? (uint16_t)DZ_DRIVE_COMMAND_ZERO : COMMAND;
 }
-
 /* By interrupt; what is written after the last one counts too. */
 static volatile uint16_t written_a[TICKS + 1u];
 static volatile uint16_t written_b[TICKS + 1u];

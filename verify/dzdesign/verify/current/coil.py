@@ -26,10 +26,10 @@ from dzdesign.verify.current.controller_states import PROGRAMS, tick_macro
 from dzdesign.verify.toolchain.compiled_library import CompiledLibrary, Function
 
 #: `struct trace` of programs/coil_loop.h: of each period of the PWM the mean currents of solenoids A and B, the largest
-#: current in both at once, the compare value in it, the sums of codes of each shunt that its interrupt was given, and
-#: the bits of the faults after it.
+#: current in both at once, the compare value in it, the sum of codes that its interrupt was given, and the bits of the
+#: faults after it.
 TRACE = np.dtype(
-    [("means_A", "<f8", 2), ("both_A", "<f8"), ("compare", "<u2"), ("totals", "<u2", 2), ("faults", "<u2")]
+    [("means_A", "<f8", 2), ("both_A", "<f8")] + [(name, "<u2") for name in ("compare", "total", "faults", "_")]
 )
 #: Bits of solenoids A and B.
 BOTH = 3

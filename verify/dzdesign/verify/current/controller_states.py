@@ -39,15 +39,15 @@ def compared(loop: CurrentLoop) -> tuple[str, ...]:
     return COMPARED_OF_TWO if loop.two else COMPARED
 
 
-def offset_names(loop: CurrentLoop, name: str = "offset") -> tuple[str, ...]:
-    """Return the names of what each shunt has."""
-    return (f"{name}_a", f"{name}_b") if loop.shunts == 2 else (name,)
+def offset_names(loop: CurrentLoop) -> tuple[str, ...]:
+    """Return the names of the offset of each shunt."""
+    return ("offset_a", "offset_b") if loop.shunts == 2 else ("offset",)
 
 
 def state_type(loop: CurrentLoop) -> np.dtype:
     """Return `struct dz_current`."""
     own = ("compare_a", "compare_b") if loop.two else ()
-    names = [*offset_names(loop, "offset_total"), "offset_ticks", *offset_names(loop), *own, "compare"]
+    names = ["offset_total", "offset_ticks", *offset_names(loop), *own, "compare"]
     names += ["on_b", "held_ticks"] if loop.two else []
     signed = {"integral": "<i4", "on_b": "<i4"}
     names = ["integral", *names, "faults", "over_ticks", "open_ticks", "ramped"]
@@ -55,9 +55,9 @@ def state_type(loop: CurrentLoop) -> np.dtype:
 
 
 def period_type(loop: CurrentLoop) -> np.dtype:
-    """Return `struct period` of programs/current_states.h, with what comes in of solenoids A and B."""
+    """Return `struct period` of programs/current_states.h, with the set points of solenoids A and B."""
     state = state_type(loop)
-    inputs = [("set_points", "<u2", 2), ("totals", "<u2", 2), ("supply_code", "<u2"), ("_", "<u2")]
+    inputs = [("set_points", "<u2", 2), ("total", "<u2"), ("supply_code", "<u2")]
     return np.dtype([("before", state), ("after", state), *inputs])
 
 
@@ -65,27 +65,21 @@ def exact_ticks(loop: CurrentLoop, given: Mapping[str, np.ndarray]) -> dict[str,
     """Return what a period of the PWM makes of many states at once.
 
     `given` has the state by the names of `compared`, which what is returned has too, the offsets, and what comes in:
-    `set_points` and `totals`, rows of two, and `supply_code`.
+    `set_points`, rows of two, `total` and `supply_code`.
     """
     if not loop.two:
-        set_point, total = given["set_points"][:, 0], given["totals"][:, 0]
-        return _one_solenoid(loop, given, set_point, total, given["offset"], given["faults"])
+        return _one_solenoid(loop, given, given["set_points"][:, 0], given["offset"], given["faults"])
     # Asked for is the solenoid with a set point; without one that which the controller has.
     asked = np.where(given["set_points"][:, 0] > 0, 0, given["on_b"])
     asked = np.where(given["set_points"][:, 1] > 0, B, asked)
     changes, on_b = asked != given["on_b"], given["on_b"] == B
     set_point = np.where(changes, 0, np.where(asked == B, given["set_points"][:, 1], given["set_points"][:, 0]))
-    offsets = [given[offset_names(loop)[shunt % loop.shunts]] for shunt in (0, 1)]
-    totals = [given["totals"][:, shunt % loop.shunts] for shunt in (0, 1)]
-    # The solenoid that is held off: with one shunt its current shows only before the other is driven.
-    held = np.where(asked == B, totals[0] - offsets[0], totals[1] - offsets[1])
-    flows = (held >= loop.open_sum) & (changes | (loop.shunts == 2))
+    place, names = np.where(on_b, OF_B, 0), offset_names(loop)
+    offset = np.where(on_b, given[names[-1]], given[names[0]])
+    flows = changes & (given["total"] - offset >= loop.open_sum)
     held_ticks = np.where(flows, given["held_ticks"] + 1, 0)
-    stuck = np.where(held_ticks >= loop.held_ticks, np.where(asked == B, HELD, HELD << OF_B), 0)
-    after = _one_solenoid(
-        loop, given, set_point, np.where(on_b, totals[1], totals[0]), np.where(on_b, offsets[1], offsets[0]),
-        given["faults"] | stuck, np.where(on_b, OF_B, 0),
-    )  # fmt: skip
+    standing = given["faults"] | np.where(held_ticks >= loop.held_ticks, HELD << place, 0)
+    after = _one_solenoid(loop, given, set_point, offset, standing, place)
     return after | {
         "compare_a": np.where(on_b, 0, after["compare"]),
         "compare_b": np.where(on_b, after["compare"], 0),
@@ -98,13 +92,13 @@ def _one_solenoid(
     loop: CurrentLoop,
     given: Mapping[str, np.ndarray],
     set_point: np.ndarray,
-    total: np.ndarray,
     offset: np.ndarray,
     standing: np.ndarray,
     place: np.ndarray | int = 0,
 ) -> dict[str, np.ndarray]:
     """Return what a period makes of the solenoid that the controller has, whose faults stand so many bits higher."""
     unit = 1 << loop.gain_shift
+    total = given["total"]
     above = np.maximum(total - offset, 0)
     aim = given["ramped"] + np.clip(set_point - given["ramped"], -loop.rate, loop.rate)
     error = aim - _rounded(loop.current_gain * above, 1 << loop.current_shift)
@@ -137,11 +131,12 @@ def _one_solenoid(
 def exact_calibrations(loop: CurrentLoop, sums: np.ndarray, faults: np.ndarray) -> dict[str, np.ndarray]:
     """Return offsets and faults after many calibrations by their sums without current; any more are left.
 
-    The sums are rows of pairs, of which one shunt has the first; `faults` are those that stood before.
+    The sums are rows, of two shunts those of A first; `faults` are those that stood before.
     """
     count, found = 1 << loop.offset_shift, {"faults": faults & ~NO_OFFSET}
     for shunt, name in enumerate(offset_names(loop)):
-        found[name] = _rounded(sums[:, :count, shunt].astype(np.int64).sum(axis=1), count)
+        own = sums[:, shunt * count : (shunt + 1) * count].astype(np.int64)
+        found[name] = _rounded(own.sum(axis=1), count)
         off = np.abs(found[name] - loop.offset_nominal) > loop.offset_tolerance
         found["faults"] = found["faults"] | np.where(off, SENSOR << OF_B * shunt, 0)
     return found
@@ -197,11 +192,9 @@ def tick_macro(loop: CurrentLoop) -> str:
     """Return tick.h: one way to call a controller of one solenoid or two, of one shunt or two, with any supply."""
     supply = ", supply" if loop.supply else ""
     asked = "(asked)[0], (asked)[1]" if loop.two else "(asked)[0]"
-    sums = "(sums)[0], (sums)[1]" if loop.shunts == 2 else "(sums)[0]"
     return (
         f"#define SOLENOIDS {1 + loop.two}\n#define SHUNTS {loop.shunts}\n"
-        f"#define CALIBRATE(loop, sums) dz_current_calibrate(loop, {sums})\n"
-        f"#define TICK(loop, asked, sums, supply) (void)(supply), dz_current_tick(loop, {asked}, {sums}{supply})\n"
+        f"#define TICK(loop, asked, sum, supply) (void)(supply), dz_current_tick(loop, {asked}, sum{supply})\n"
     )
 
 
@@ -234,7 +227,7 @@ class HostStates:
     def offsets(self, seed: int, count: int) -> tuple[np.ndarray, np.ndarray, int]:
         """Return the states at the end of so many calibrations, their sums, and the hash."""
         ends = np.zeros(count, dtype=state_type(self._loop))
-        sums = np.zeros((count, (1 << self._loop.offset_shift) + 1, 2), dtype=np.uint16)
+        sums = np.zeros((count, self._loop.offset_ticks + 1), dtype=np.uint16)
         return ends, sums, self._library.call("current_offsets", seed, count, ends, sums)
 
 
@@ -242,7 +235,7 @@ def given_of(loop: CurrentLoop, periods: np.ndarray) -> dict[str, np.ndarray]:
     """Return state and inputs before each period, as `exact_ticks` takes them."""
     before = periods["before"]
     given = {name: before[name].astype(np.int64) for name in (*compared(loop), *offset_names(loop))}
-    return given | {name: periods[name].astype(np.int64) for name in ("set_points", "totals", "supply_code")}
+    return given | {name: periods[name].astype(np.int64) for name in ("set_points", "total", "supply_code")}
 
 
 def check_states(
@@ -272,6 +265,7 @@ def check_states(
         first.append(f"initial state {initial}, expected {known}")
     ends, sums, hashed = host.offsets(seed, OFFSETS)
     calibrated = exact_calibrations(loop, sums, NO_OFFSET | (2 * np.arange(OFFSETS) & STANDING))
+    calibrated |= {"on_b": np.zeros(OFFSETS)} if loop.two else {}
     places = np.flatnonzero(np.any([ends[name] != values for name, values in calibrated.items()], axis=0))
     wrong += len(places)
     for at in places[:1]:

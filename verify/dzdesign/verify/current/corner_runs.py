@@ -132,7 +132,7 @@ def held_current(simulation: CoilSimulation, corner: Corner, share: float, offse
     asked = set_point / loop.full_counts * around.circuit.rated_A * around.codes_per_A
     # As the converter gives it without current: rounded down.
     zero = np.floor((around.sensor.offset_V * around.codes_per_V) + offset_codes)
-    readings = found["totals"][settle:, 0].astype(float) / sampling.samples - zero
+    readings = found["total"][settle:].astype(float) / sampling.samples - zero
     released, mean = np.split(found["means_A"][:, 0] * around.codes_per_A, [settle])
     return HeldCurrent(
         swing=float(max(np.ptp(mean), np.ptp(readings))),

@@ -3,7 +3,7 @@
 import re
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
@@ -109,6 +109,7 @@ class Trace:
     clock_Hz: int
     events: tuple[Event, ...]
     early: tuple[Event, ...]
+    _pins: dict[int, Pin] = field(default_factory=dict)
 
     def times(self, word: str, one: int | None = None) -> list[int]:
         """Return when something happened."""
@@ -133,10 +134,12 @@ class Trace:
         return 1e3 * (at - self.start) / self.clock_Hz
 
     def pin(self, gpio: int) -> Pin:
-        """Return the levels of a pin."""
-        early = [each.two for each in self.early if (each.word, each.one) == ("pin", gpio)]
-        own = [each for each in self.events if (each.word, each.one) == ("pin", gpio)]
-        return Pin(own, early[-1] if early else LOW)
+        """Return the levels of a pin; kept, because they are asked for in each period."""
+        if gpio not in self._pins:
+            early = [each.two for each in self.early if (each.word, each.one) == ("pin", gpio)]
+            own = [each for each in self.events if (each.word, each.one) == ("pin", gpio)]
+            self._pins[gpio] = Pin(own, early[-1] if early else LOW)
+        return self._pins[gpio]
 
     def pins_that_switch(self) -> list[int]:
         """Return the pins that change after the start."""
@@ -162,11 +165,19 @@ class Bench:
         self.compensator, self.board, self.device = compensator, board.values, DEVICES[manifest.target]
         self._target, self._user, self._failure = manifest.target, board.code, ""
         target = compensator.target
-        names = (target.channels if target else ()) or self.device.channels[:5]
+        drive = compensator.current_drive
+        shunts = drive.loop.shunts if drive else 1
+        roles = ("COMMAND", "PRESSURE_A", "PRESSURE_B", "CURRENT", "SUPPLY", "CURRENT_B")
+        names = dict(zip(roles, self.device.channels, strict=False))
+        roles = (*roles[:4], *(roles[5:] if shunts == 2 else ()), roles[4])
+        if target and target.channels:
+            names = dict(zip(roles, target.channels, strict=False))
         self.crystal_Hz = (target.crystal_Hz if target else None) or self.device.crystal_Hz
-        self.names = dict(zip(("COMMAND", "PRESSURE_A", "PRESSURE_B", "CURRENT", "SUPPLY"), names, strict=False))
+        self.names = {role: names[role] for role in roles if role in names}
         #: Numbers of the declared channels, by what they carry.
         self.channels = {role: self.device.channels.index(name) for role, name in self.names.items()}
+        #: Those of the shunts, that of solenoid A first; of one solenoid, or one shunt, one.
+        self.shunts = [self.channels[role] for role in ("CURRENT", "CURRENT_B")[:shunts] if drive]
         self.two = len(compensator.signals.signs) == 2
         if board.lacking:
             raise RequirementError(f"dz_board.h has no DZ_BOARD_{board.lacking[0]}, which the firmware needs")

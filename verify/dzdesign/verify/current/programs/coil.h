@@ -57,8 +57,8 @@ struct coil_run
     struct winding windings[SOLENOIDS];
     const struct sensor *sensor;
     uint16_t supply_code;
-    uint16_t codes[2][SHUNTS][MOST_SAMPLES]; /* of this period and the last one, by turns */
-    uint16_t sums[2];                        /* what the last interrupt was given */
+    uint16_t codes[2][MOST_SAMPLES]; /* of this period and the last one, by turns */
+    uint16_t sum;                    /* what the last interrupt was given */
     uint32_t periods;
     double means_A[2]; /* over the last period */
     double both_A;    /* the largest current in it that both solenoids had at once, at the samples */
@@ -96,16 +96,15 @@ static inline void coil_at_rest(struct coil_run *run, const struct coil *coil, c
 {
     const struct coil_run rest = {.sensor = sensor};
     const uint16_t no_current = code_of(sensor->offset_V, sensor);
-    const uint16_t sums[2] = {(uint16_t)(no_current * coil->samples), (uint16_t)(no_current * coil->samples)};
 
     *run = rest;
     coil_becomes(run, coil);
     dz_current_init(&run->loop);
     for (uint16_t tick = 0u; tick < DZ_CURRENT_OFFSET_TICKS; tick++) {
-        CALIBRATE(&run->loop, sums);
+        dz_current_calibrate(&run->loop, (uint16_t)(no_current * coil->samples));
     }
-    for (int32_t sample = 0; sample < SHUNTS * coil->samples; sample++) {
-        run->codes[1][sample % SHUNTS][sample / SHUNTS] = no_current;
+    for (int32_t sample = 0; sample < coil->samples; sample++) {
+        run->codes[1][sample] = no_current;
     }
 }
 
@@ -155,46 +154,60 @@ static inline double coil_duty(const struct coil_run *run, int32_t solenoid)
     return coil->stuck ? 1.0 : compare / coil->full_counts;
 }
 
+/* Whether the current of a solenoid passes the shunt whose codes are taken. */
+static inline int coil_is_sensed(const struct coil_run *run, int32_t solenoid)
+{
+#if SHUNTS == 2
+    return solenoid == ((run->loop.on_b != 0u) ? 1 : 0);
+#else
+    (void)run;
+    (void)solenoid;
+    return 1;
+#endif
+}
+
 /* A period of the PWM with the compare values in force, and the interrupt in it. */
 static inline void coil_period(struct coil_run *run, const uint16_t *set_points)
 {
     const struct coil *coil = run->windings[0].coil;
     const int32_t count = coil->samples;
-    uint16_t(*const now)[MOST_SAMPLES] = run->codes[run->periods & 1u];
-    uint16_t(*const last)[MOST_SAMPLES] = run->codes[(run->periods & 1u) ^ 1u];
+    uint16_t *const now = run->codes[run->periods & 1u];
+    const uint16_t *const last = run->codes[(run->periods & 1u) ^ 1u];
     double from = 0.0, duties[SOLENOIDS], charges[SOLENOIDS];
 
-    run->sums[0] = run->sums[1] = 0u;
+    run->sum = 0u;
     run->both_A = 0.0;
+    /* The interrupt has the codes of the last period from the time of day on that it comes at. */
+    for (int32_t sample = coil->samples_before; sample < count; sample++) {
+        run->sum = (uint16_t)(run->sum + last[sample]);
+    }
     for (int32_t solenoid = 0; solenoid < SOLENOIDS; solenoid++) {
         duties[solenoid] = coil_duty(run, solenoid);
         charges[solenoid] = 0.0;
     }
     for (int32_t sample = 0; sample < count; sample++) {
         const double until = (sample + 0.5) / count;
-        double shunts[SHUNTS] = {0.0}, both_A = HUGE_VAL;
+        double through_A = 0.0, both_A = HUGE_VAL;
 
         for (int32_t solenoid = 0; solenoid < SOLENOIDS; solenoid++) {
             struct winding *const winding = &run->windings[solenoid];
 
             charges[solenoid] += coil_part(winding, from, until, sample == 0, duties[solenoid]);
-            shunts[solenoid % SHUNTS] += winding->current;
+            through_A += coil_is_sensed(run, solenoid) ? winding->current : 0.0;
             both_A = fmin(both_A, winding->current);
         }
         run->both_A = fmax(run->both_A, both_A);
         from = until;
-        for (int32_t shunt = 0; shunt < SHUNTS; shunt++) {
-            now[shunt][sample] = code_of(run->sensor->offset_V + shunts[shunt] * run->sensor->V_per_A, run->sensor);
-            /* The interrupt has the codes of the last period from the time of day on that it comes at. */
-            run->sums[shunt] = (uint16_t)(run->sums[shunt] +
-                                          ((sample < coil->samples_before) ? now : last)[shunt][sample]);
+        now[sample] = code_of(run->sensor->offset_V + through_A * run->sensor->V_per_A, run->sensor);
+        run->sum = (uint16_t)(run->sum + ((sample < coil->samples_before) ? now[sample] : 0u));
+        if (sample == coil->samples_before - 1) {
+            TICK(&run->loop, set_points, run->sum, run->supply_code);
         }
     }
     for (int32_t solenoid = 0; solenoid < SOLENOIDS; solenoid++) {
         charges[solenoid] += coil_part(&run->windings[solenoid], from, 1.0, 1, duties[solenoid]);
         run->means_A[solenoid] = charges[solenoid] / coil->period_s;
     }
-    TICK(&run->loop, set_points, run->sums, run->supply_code);
     run->periods++;
 }
 

@@ -18,8 +18,7 @@ void coil_loop(const struct coil *coils, const uint32_t *changes, uint32_t coil_
         traces[k].means_A[0] = run.means_A[0];
         traces[k].means_A[1] = run.means_A[1];
         traces[k].both_A = run.both_A;
-        traces[k].sums[0] = run.sums[0];
-        traces[k].sums[1] = run.sums[1];
+        traces[k].sum = run.sum;
         traces[k].faults = (uint16_t)run.loop.faults;
     }
 }

@@ -11,8 +11,9 @@ struct trace
     double means_A[2]; /* over the period, of solenoids A and B */
     double both_A;    /* in both at once */
     uint16_t compare;
-    uint16_t sums[2]; /* what the interrupt in it was given */
+    uint16_t sum;     /* what the interrupt in it was given */
     uint16_t faults;  /* after it */
+    uint16_t unused;
 };
 
 /* Runs `count` periods from no current, calibrated, with two set points each; from each of the periods `changes` on with

@@ -31,13 +31,12 @@ static uint16_t drawn(const uint16_t *edges, uint16_t count)
     return (uint16_t)(random >> 16);
 }
 
-static uint32_t *offset_of(struct dz_current *loop, unsigned shunt)
+static uint32_t offset_in_use(const struct dz_current *loop)
 {
 #if SHUNTS == 2
-    return (shunt == 0u) ? &loop->offset_a : &loop->offset_b;
+    return (loop->on_b == 0u) ? loop->offset_a : loop->offset_b;
 #else
-    (void)shunt;
-    return &loop->offset;
+    return loop->offset;
 #endif
 }
 
@@ -78,9 +77,12 @@ static void any_state(struct dz_current *loop)
         break;
     }
     loop->faults = ((random & 0x70u) == 0u) ? (random >> 8) & 31u : 0u;
-    for (unsigned shunt = 0u; shunt < SHUNTS; shunt++) {
-        *offset_of(loop, shunt) = drawn(offset_edges, COUNT(offset_edges));
-    }
+#if SHUNTS == 2
+    loop->offset_a = drawn(offset_edges, COUNT(offset_edges));
+    loop->offset_b = drawn(offset_edges, COUNT(offset_edges));
+#else
+    loop->offset = drawn(offset_edges, COUNT(offset_edges));
+#endif
 #if SOLENOIDS == 2
     loop->on_b = ((random & 0x2000u) != 0u) ? 0xFFFFFFFFu : 0u;
     loop->held_ticks = drawn(held_tick_edges, COUNT(held_tick_edges));
@@ -120,7 +122,7 @@ uint32_t current_states(uint32_t seed, uint32_t count, struct period *periods)
 
     begin(seed);
     for (uint32_t k = 0u; k < count; k++) {
-        uint16_t set_point, supply, set_points[2], sums[2] = {0u, 0u};
+        uint16_t set_point, sum, supply, set_points[2];
         struct dz_current before;
 
         if ((k == 0u) || ((any() & 0x300u) == 0u) || ((loop.faults != 0u) && ((any() & 0x7000u) != 0u))) {
@@ -131,17 +133,14 @@ uint32_t current_states(uint32_t seed, uint32_t count, struct period *periods)
             set_point = (uint16_t)(loop.ramped + (uint16_t)(any() % (2u * RATE_EDGE + 9u)) - (uint16_t)(RATE_EDGE + 4u));
         }
         draw_set_points(&loop, set_point, set_points);
-        for (unsigned shunt = 0u; shunt < SHUNTS; shunt++) {
-            sums[shunt] = ((any() & 0xC00u) == 0u)
-                              ? drawn(sum_edges, COUNT(sum_edges))
-                              : (uint16_t)(*offset_of(&loop, shunt) + (drawn(above_edges, COUNT(above_edges)) >> 1));
-        }
+        sum = ((any() & 0xC00u) == 0u) ? drawn(sum_edges, COUNT(sum_edges))
+                                       : (uint16_t)(offset_in_use(&loop) + (drawn(above_edges, COUNT(above_edges)) >> 1));
         supply = drawn(supply_edges, COUNT(supply_edges));
         before = loop;
-        TICK(&loop, set_points, sums, supply);
+        TICK(&loop, set_points, sum, supply);
         hash = hash_of(hash, &loop);
         if (periods != NULL) {
-            periods[k] = (struct period){before, loop, {set_points[0], set_points[1]}, {sums[0], sums[1]}, supply};
+            periods[k] = (struct period){before, loop, {set_points[0], set_points[1]}, sum, supply};
         }
     }
     return hash;
@@ -156,7 +155,7 @@ uint32_t current_offsets(uint32_t seed, uint32_t count, struct dz_current *ends,
         struct dz_current loop;
 
         /* Of four calibrations three lie about one value, their mean at half a code: the ends that matter are met. */
-        const uint16_t about[2] = {drawn(offset_edges, COUNT(offset_edges)), drawn(offset_edges, COUNT(offset_edges))};
+        const uint16_t about = drawn(offset_edges, COUNT(offset_edges));
         const int scattered = (any() & 0x300u) == 0u;
 
         dz_current_init(&loop);
@@ -164,17 +163,14 @@ uint32_t current_offsets(uint32_t seed, uint32_t count, struct dz_current *ends,
         /* Faults that stand already must stay: every combination of them. */
         loop.faults |= (2u * k) & (DZ_CURRENT_SENSOR | DZ_CURRENT_OPEN | DZ_CURRENT_SHORT | DZ_CURRENT_OVER);
         for (uint16_t tick = 0u; tick <= DZ_CURRENT_OFFSET_TICKS; tick++) {
-            uint16_t pair[2];
+            const uint16_t sum = scattered ? drawn(offset_edges, COUNT(offset_edges))
+                                           : (uint16_t)(about + ((any() >> 8) & 1u));
 
-            for (unsigned shunt = 0u; shunt < 2u; shunt++) {
-                pair[shunt] = scattered ? drawn(offset_edges, COUNT(offset_edges))
-                                        : (uint16_t)(about[shunt] + ((any() >> 8) & 1u));
-            }
-            CALIBRATE(&loop, pair);
+            dz_current_calibrate(&loop, sum);
             hash = hash_of(hash, &loop);
             if (sums != NULL) {
-                *sums++ = pair[0];
-                *sums++ = pair[1];
+                *sums = sum;
+                sums++;
             }
         }
         if (ends != NULL) {
