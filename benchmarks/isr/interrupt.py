@@ -59,6 +59,7 @@ uint16_t dz_comp(uint16_t u, uint16_t p_a, uint16_t p_b)
     dz_board_current_sum = SUM;
     state.ticks_without_sample = 0u;
     ticks_to_sample = FRESH;
+    KEPT
     dz_isr();
     return dz_board_compare_a;
 }
@@ -67,9 +68,9 @@ EMPTY = re.compile(r"void dz_isr\(void\)\n\{.*?\n\}\n", re.DOTALL)
 
 
 def with_current(compensator: Compensator) -> Compensator:
-    """Return a compensator with current control of the example's coil."""
-    drive = design_current_drive(REQUEST, compensator.signals.compare_max)
-    return replace(compensator, current_drive=drive)
+    """Return a compensator with current control of the example's coil, of two solenoids with one shunt for both."""
+    request = replace(REQUEST, solenoids=len(compensator.signals.signs))
+    return replace(compensator, current_drive=design_current_drive(request, compensator.signals.compare_max))
 
 
 def _sources(compensator: Compensator) -> dict[str, str]:
@@ -97,7 +98,10 @@ def count_interrupt(compensator: Compensator, inputs: Sequence[Codes], folder: P
     """Count the interrupt of a compensator with current control, with a new sample or without."""
 
     def counted(sources: Mapping[str, str], name: str) -> Counts:
+        # The sum is the same on both sides, so that the current of a solenoid never ends.
+        kept = "loop.held_ticks = 0u;" if len(compensator.signals.signs) == 2 else ""
         entry = ENTRY.replace("FRESH", "0u" if fresh else "1u").replace("SUM", f"{_sum(compensator)}u")
+        entry = entry.replace("KEPT", kept)
         contender = Contender(name=name, made="", sources={**sources, "entry.c": entry})
         return on_cortex_m4.count(contender, inputs, folder / name)
 
