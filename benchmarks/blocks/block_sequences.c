@@ -110,8 +110,8 @@ static void make_sound(uint16_t *code, uint16_t zero_first, uint16_t turned)
     const uint16_t low = code[1] < code[2] ? code[1] : code[2], high = code[1] < code[2] ? code[2] : code[1];
 
     code[0] = clipped(zero_first != 0u ? dz_block.command_zero : code[0], dz_block.command_low, dz_block.command_high);
-    code[1] = clipped(turned != 0u ? (uint16_t)(low / 4u) : high, dz_block.a_low, dz_block.a_high);
-    code[2] = clipped(turned != 0u ? high : low, dz_block.b_low, dz_block.b_high);
+    code[1] = clipped(turned != 0u ? (uint16_t)(low / 4u) : high, dz_block.sensors[0].low, dz_block.sensors[0].high);
+    code[2] = clipped(turned != 0u ? high : low, dz_block.sensors[1].low, dz_block.sensors[1].high);
 }
 
 static void run_drive(void)

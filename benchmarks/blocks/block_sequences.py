@@ -114,7 +114,7 @@ class Program:
 
 def drive_program(forms: TwoForms, seed: int, machines: tuple[Machine, ...] = (HOST, CORTEX_M4, AVR)) -> Program:
     """Return the comparison of a design's drive functions."""
-    swapped = f"#define SWAPPED {int(built_for(forms.compensator).has('SWAPPED'))}\n"
+    swapped = f"#define SWAPPED {int(built_for(forms.compensator).pair(-1) == 'BA')}\n"
     return Program(
         block=forms.block,
         headers={

@@ -162,9 +162,14 @@ class Bench:
         self.compensator, self.board, self.device = compensator, board.values, DEVICES[manifest.target]
         self._target, self._user, self._failure = manifest.target, board.code, ""
         target = compensator.target
-        names = (target.channels if target else ()) or self.device.channels[:5]
+        inputs = ["COMMAND", *(f"PRESSURE_{name}" for name in compensator.signals.pressures)]
+        usual = {"COMMAND": "A0", "PRESSURE_A": "A1", "PRESSURE_B": "A2", "PRESSURE_C": "A6"}
+        usual |= {"CURRENT": "A3", "SUPPLY": "A4"}
+        if target and target.channels:
+            self.names = dict(zip((*inputs, "CURRENT", "SUPPLY"), target.channels, strict=False))
+        else:
+            self.names = {role: usual[role] for role in (*inputs, "CURRENT", "SUPPLY")}
         self.crystal_Hz = (target.crystal_Hz if target else None) or self.device.crystal_Hz
-        self.names = dict(zip(("COMMAND", "PRESSURE_A", "PRESSURE_B", "CURRENT", "SUPPLY"), names, strict=False))
         #: Numbers of the declared channels, by what they carry.
         self.channels = {role: self.device.channels.index(name) for role, name in self.names.items()}
         self.two = len(compensator.signals.signs) == 2
