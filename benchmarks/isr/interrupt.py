@@ -98,8 +98,9 @@ def count_interrupt(compensator: Compensator, inputs: Sequence[Codes], folder: P
     """Count the interrupt of a compensator with current control, with a new sample or without."""
 
     def counted(sources: Mapping[str, str], name: str) -> Counts:
-        # The sum is the same on both sides, so that the current of a solenoid never ends.
-        kept = "loop.held_ticks = 0u;" if len(compensator.signals.signs) == 2 else ""
+        # Zero command has been seen; and the sum is the same on both sides, so that the current of neither ends.
+        two, samples = len(compensator.signals.signs) == 2, compensator.drive_functions.fault_samples
+        kept = f"drive.valid_commands = {samples}u; loop.held_ticks = 0u;" if two else ""
         entry = ENTRY.replace("FRESH", "0u" if fresh else "1u").replace("SUM", f"{_sum(compensator)}u")
         entry = entry.replace("KEPT", kept)
         contender = Contender(name=name, made="", sources={**sources, "entry.c": entry})

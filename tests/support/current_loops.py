@@ -66,14 +66,18 @@ LOOPS = {
 }
 
 
+def shape_of(loop: CurrentLoop) -> int:
+    """Return what a firmware with this controller is compiled for."""
+    holds = {"CURRENT": True, "SUPPLY": loop.supply, "BIPOLAR": loop.two, "SHUNTS": loop.shunts == 2}
+    return sum(bool(holds.get(name)) << place for place, name in enumerate(SHAPE_BITS))
+
+
 def current_texts(loop: CurrentLoop, banner: Sequence[str] = ()) -> dict[str, str]:
     """Return the files of a current controller by itself, its numbers beside those of the goldens' valve."""
     compensator = variant("default")
     built = built_for(compensator, fixed=True)
     sizes = replace(built.sizes, supply_mask=63 if loop.supply else 0)
-    holds = {"CURRENT": True, "SUPPLY": loop.supply, "BIPOLAR": loop.two, "SHUNTS": loop.shunts == 2}
-    shape = sum(bool(holds.get(name)) << place for place, name in enumerate(SHAPE_BITS))
-    built = replace(built, shape=shape, samples=loop.samples, sizes=sizes)
+    built = replace(built, shape=shape_of(loop), samples=loop.samples, sizes=sizes)
     numbers = replace(numbers_of(compensator), current=current_block(loop, sizes))
     made = texts(valve_files(ValvePage(compensator=compensator, block=numbers, built=built)), banner)
     # The stand-ins for dz_comp.h have these two of their own.

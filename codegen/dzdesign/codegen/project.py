@@ -82,9 +82,21 @@ def target_named(name: str) -> Target:
     return target
 
 
-def target_for(designed_for: TargetInputs) -> Target:
-    """Return the target that a compensator was designed for, on the board that was declared."""
-    return target_named(designed_for.name).on_board(designed_for.crystal_Hz, designed_for.channels)
+def target_for(designed_for: TargetInputs, inputs: Sequence[str] = ()) -> Target:
+    """Return the target that a compensator with these inputs was designed for, on the board that was declared."""
+    return target_named(designed_for.name).on_board(designed_for.crystal_Hz, designed_for.channels, inputs)
+
+
+def inputs_of(compensator: Compensator) -> tuple[str, ...]:
+    """Return what a compensator reads, as `c2000.ROLES` names it, in the order of its declared channels."""
+    drive = compensator.current_drive
+    pressures = (f"pressure_{name.lower()}" for name in compensator.signals.pressures)
+    return (
+        "command",
+        *pressures,
+        *(["current", "current_b"][: drive.loop.shunts] if drive else []),
+        *(["supply"] if drive and drive.loop.supply else []),
+    )
 
 
 def targets() -> tuple[Target, ...]:
@@ -120,7 +132,7 @@ def generate(
     designed_for = compensator.target
     target = target_named(target_name or (designed_for.name if designed_for else DEFAULT_TARGET))
     if designed_for:
-        of_design = target_for(designed_for)
+        of_design = target_for(designed_for, inputs_of(compensator))
         of_design.check_designed_for(designed_for)
         target = of_design if of_design.name == target.name else target
     target.check_signals(compensator.signals)
@@ -191,6 +203,9 @@ def target_files(
         full_V = compensator.target.converter.full_V
     values = {
         "bipolar": len(signals.signs) == 2,
+        "three": signals.pressure_c is not None,
+        # Of the negative side's functions: what their codes end with, ahead and behind.
+        "negative_pair": signals.negative_pair.lower(),
         "signals": signals,
         "units": compensator.valve.recorded_units.of_controller,
         "u_max_V": float(compensator.u_max_V),
@@ -200,7 +215,6 @@ def target_files(
         "core_sources": core_sources(block=block is not None, current=current is not None),
         "core_headers": core_headers(block=block is not None, current=current is not None),
         **block_values(compensator, block, target),
-        **target.channel_values(roles_of(compensator)),
         "current": current,
         "loads": block is not None and target.link is not None,
         "link_sources": link_names(target, ".c") if block else (),
@@ -227,17 +241,6 @@ def target_files(
         for path, template in {**target.templates, **in_block_form}.items()
     }
     return files | (_load_files(target, banner) if block and target.link else {})
-
-
-def roles_of(compensator: Compensator) -> tuple[str, ...]:
-    """Return what the converter reads, in the order of the declared channels."""
-    drive = compensator.current_drive
-    there = {
-        "current": drive is not None,
-        "current_b": drive is not None and drive.loop.shunts == 2,
-        "supply": drive is not None and drive.loop.supply is not None,
-    }
-    return ("command", "pressure_a", "pressure_b", *(role for role, is_there in there.items() if is_there))
 
 
 def _load_files(target: Target, banner: Banner) -> dict[str, str]:

@@ -71,14 +71,11 @@ class Target:
     sector: FlashSector | None = None
     #: The serial line of its telemetry, if it sends any.
     link: Link | None = None
-    #: Declared of the board: its crystal, and the converter's channels in the order of what it reads.
+    #: Declared of the board: its crystal, and the converter's channels in the order of `c2000.ROLES`.
     crystal_Hz: int | None = None
     channels: tuple[str, ...] = ()
-    #: The converter's channels in the order of their numbers; and of what it reads that where none is declared.
-    known_channels: tuple[str, ...] = ()
-    channel_of_role: Mapping[str, str] = field(default_factory=dict)
     #: What makes this target on a declared board; None where a board has nothing that these files would know.
-    of_board: Callable[[int | None, Sequence[str]], "Target"] | None = None
+    of_board: Callable[[int | None, Sequence[str], Sequence[str]], "Target"] | None = None
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", self.name):
@@ -113,8 +110,10 @@ class Target:
         """Where a calibration block lies; address 0, in octets, where it has no sector of its own."""
         return self.sector.place if self.sector else Place()
 
-    def on_board(self, crystal_Hz: int | None, channels: Sequence[str]) -> "Target":
+    def on_board(self, crystal_Hz: int | None, channels: Sequence[str], inputs: Sequence[str] = ()) -> "Target":
         """Return the target on a board with this crystal and these channels; without any the target as it is.
+
+        The channels are those of `inputs`, one by one: of a design's, or as long as it is not made of all that may be.
 
         Raises
         ------
@@ -127,21 +126,11 @@ class Target:
             given = "--crystal" if crystal_Hz else "--channels"
             raise InputError(f"{given} is of a board of TI's C2000, and target {self.name} has none; leave it out")
         try:
-            return replace(self.of_board(crystal_Hz, channels), of_board=self.of_board)
+            return replace(self.of_board(crystal_Hz, channels, inputs), of_board=self.of_board)
         except InputError:
             raise
         except DzdesignError as error:
             raise InputError(f"--crystal: {self.name} can't be clocked by it: {error}") from error
-
-    def channel_values(self, roles: Sequence[str]) -> dict[str, str]:
-        """Return name and number of the channel of each of these roles, printed; nothing without a converter."""
-        if not self.channel_of_role:
-            return {}
-        channels = self.channels or [self.channel_of_role[role] for role in roles]
-        names = dict(zip(roles, channels, strict=True))
-        return {f"{role}_channel": f"ADCIN{name}" for role, name in names.items()} | {
-            f"{role}_number": str(self.known_channels.index(name)) for role, name in names.items()
-        }
 
     def inputs(self) -> TargetInputs:
         """Return the converter and timer that a compensator for this target is designed for."""
@@ -158,12 +147,13 @@ class Target:
 
     def check_current_control(self, sampling: CurrentSampling) -> None:
         """Refuse a compensator with current control where the target's files have none, or sample at other times."""
-        if (ours := self.current_sampling) is None:
+        if self.current_sampling is None:
             raise InputError(
                 f"the compensator controls the current, but the files of target {self.name} do not; "
                 "design it again with --drive duty, or for another target"
             )
-        if sampling != ours and not self.takes_any_signals:
+        if sampling != self.current_sampling and not self.takes_any_signals:
+            ours = self.current_sampling
             raise InputError(
                 f"the compensator's current loop is for {sampling.samples} samples a PWM period, {sampling.before} of "
                 f"them before the interrupt, but target {self.name} takes {ours.samples} and {ours.before}; "

@@ -206,7 +206,7 @@ class Compensator(ShownInNotebooks, Artefact):
 
     def nodes(self, sign: int = 1) -> int:
         """Return the number of nodes that beta needs to cover every pressure-code difference."""
-        return self.signals.largest_difference(sign) // self.beta_step_codes + 2
+        return self.signals.pair(sign).largest_difference // self.beta_step_codes + 2
 
     def beta(self, dp_code: int, sign: int = 1) -> Fraction:
         """Return the exact certified beta at a pressure-code difference."""

@@ -236,7 +236,7 @@ def test_start_up_order_and_watchdog():
         (PLAIN, HARDWARE, "SEQ_CASC = 0u", "SEQ_CASC = 1u", of_current("sampling")),
         (PLAIN, HARDWARE, "AdcRegs.ADCTRL2.bit.EPWM_SOCB_SEQ2 = 1u;", "", of_current("start")),
         (PLAIN, "dz_hardware.h", "((channel) * 0x1111u)", "0x3332u", of_current("start")),
-        (PLAIN, HARDWARE, "ADCCHSELSEQ4.all = DZ_CURRENT_CHANNELS(DZ_BOARD_CURRENT)", "ADCCHSELSEQ4.all = 0u", of_current("start")),
+        (PLAIN, HARDWARE, "SEQ4.all = DZ_CURRENT_CHANNELS(DZ_BOARD_CURRENT)", "SEQ4.all = 0u", of_current("start")),
         (PLAIN, HARDWARE, "AdcMirror.ADCRESULT15", "AdcMirror.ADCRESULT0", of_current("start")),
         (PLAIN, HARDWARE, "CONV00 = DZ_BOARD_COMMAND", "CONV00 = 3u", check_current_registers),
         (PLAIN, HARDWARE, "TZA = TZ_FORCE_LO", "TZA = TZ_FORCE_HI", of_current("start")),

@@ -71,6 +71,8 @@ STATUS_BITS = {
     "DIFFERENCE": "valid pressures, but their drop too far below zero, so the smallest beta is used",
     "ABOVE": "pressure drop above the highest tested one: no fault, but no recording either",
 }
+#: The law's bit of a third pressure input.
+THIRD_BIT = {"PRESSURE_C": (9, "pressure C outside its valid codes, so the smallest beta is used where it counts")}
 #: Bits that the drive adds to those of the law, each with its place.
 DRIVE_BITS = {
     "WAITING": (5, "the drive waits: for valid commands, and with the interlock for zero command"),
@@ -92,9 +94,12 @@ HELD_BIT = {"HELD": "the current does not end as the other solenoid is asked for
 OF_B = 8
 
 
-def status_constants() -> list[Define]:
-    """Return the bits of the law's status word."""
-    return [*_bits("DZ_STATUS", ((place, *each) for place, each in enumerate(STATUS_BITS.items())), "the status word")]
+def status_constants(inputs: str) -> list[Define]:
+    """Return the bits of the law's status word, for the pressure inputs of these names."""
+    bits = {name: (place, text) for place, (name, text) in enumerate(STATUS_BITS.items())} | THIRD_BIT
+    if "C" not in inputs:
+        bits.pop(*THIRD_BIT)
+    return [*_bits("DZ_STATUS", ((place, name, text) for name, (place, text) in bits.items()), "the status word")]
 
 
 def drive_status_constants(*, block: bool) -> list[Define]:

@@ -117,7 +117,7 @@ def zero_command_points(compensator: Compensator) -> tuple[int, ...]:
     """Return the set points at zero command at the ends of the tested interval, counts."""
     signals, ends = compensator.signals, compensator.positive.certificate.dp_MPa
     zero = signals.command.zero_code
-    return tuple(sorted({compensator.compare(zero, round(signals.dp_code(dp))) for dp in ends}))
+    return tuple(sorted({compensator.compare(zero, round(signals.pair(1).dp_code(dp))) for dp in ends}))
 
 
 def _result(simulation: CoilSimulation, found: ControllerStates, compensator: Compensator) -> CurrentLoopResult:

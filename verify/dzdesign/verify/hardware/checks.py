@@ -29,9 +29,8 @@ HELD_PER_A = 1e4
 WRITTEN_PERIODS = 4
 #: Least and most samples of each set of codes; in between so many that a ramp goes this share of the command.
 SAMPLES_OF_CODES, RAMPED = (5, 200), 0.06
-#: Codes, of command, pressure A and pressure B; and what carries them.
-Codes = tuple[int, int, int]
-INPUTS = ("COMMAND", "PRESSURE_A", "PRESSURE_B")
+#: Codes, of the command and of each pressure.
+Codes = tuple[int, ...]
 
 
 @dataclass
@@ -51,11 +50,20 @@ class HardwareRuns:
     # ---- what is on the channels ----
 
     @cached_property
-    def pressures(self) -> list[tuple[int, int]]:
-        """Pairs of valid codes, no two differences alike, and none of them its own mirror image."""
-        shares = ((0.6, 0.2), (0.3, 0.1), (0.5, 0.25))
-        (a_low, a_high), (b_low, b_high) = self.signals.pressure_a.valid_codes, self.signals.pressure_b.valid_codes
-        return [(a_low + round(a * (a_high - a_low)), b_low + round(b * (b_high - b_low))) for a, b in shares]
+    def inputs(self) -> tuple[str, ...]:
+        """What carries the codes: roles of the channels."""
+        return ("COMMAND", *(f"PRESSURE_{name}" for name in self.signals.pressures))
+
+    @cached_property
+    def pressures(self) -> list[Codes]:
+        """Valid codes, no two differences alike, and none of them its own mirror image; with C no drop below zero."""
+        third = {"BC": (0.1, 0.02, 0.17), "CA": (0.8, 0.45, 0.7)}.get(self.signals.negative_pair, (0.4, 0.22, 0.35))
+        shares = zip((0.6, 0.3, 0.5), (0.2, 0.1, 0.25), third, strict=True)
+        ends = [sensor.valid_codes for sensor in self.signals.pressures.values()]
+        return [
+            tuple(low + round(share * (high - low)) for share, (low, high) in zip(each, ends, strict=False))
+            for each in shares
+        ]
 
     @cached_property
     def followed(self) -> list[tuple[float, Codes]]:
@@ -85,7 +93,8 @@ class HardwareRuns:
 
     def codes(self, at_us: float, codes: Codes) -> list[Step]:
         """Return the steps that put codes on the declared channels."""
-        return [Step(at_us, "code", self.bench.channels[role], code) for role, code in zip(INPUTS, codes, strict=True)]
+        channels = [self.bench.channels[role] for role in self.inputs]
+        return [Step(at_us, "code", channel, code) for channel, code in zip(channels, codes, strict=True)]
 
     def at_rest(self) -> list[Step]:
         """Return the steps for valid codes, and no current."""
@@ -173,7 +182,7 @@ class HardwareRuns:
 
     def channel_words(self, codes: Codes) -> str:
         """Name the codes of a sample with their channels."""
-        return ", ".join(f"{code} on {self.bench.names[role]}" for role, code in zip(INPUTS, codes, strict=True))
+        return ", ".join(f"{code} on {self.bench.names[role]}" for role, code in zip(self.inputs, codes, strict=True))
 
     def period(self, trace: Trace) -> int:
         """Return the counts of a PWM period at the clock of the device."""
@@ -265,7 +274,7 @@ def _reaches(runs: HardwareRuns) -> str:
     trace = runs.following
     period, held = runs.period(trace), {each.one for each in trace.events if each.word == "hold"}
     for role, channel in runs.bench.channels.items():
-        used = role in INPUTS or channel in runs.bench.shunts or (runs.drive and runs.drive.loop.supply)
+        used = role in runs.inputs or channel in runs.bench.shunts or (runs.drive and runs.drive.loop.supply)
         if used and channel not in held:
             return f"{runs.bench.names[role]}, declared for the {role.lower().replace('_', ' ')}, is never converted"
     for frame, (codes, *compares) in zip(runs.frames(trace), runs.expected(trace), strict=True):
@@ -431,7 +440,7 @@ def hardware_checks(make: Callable[[], Bench]) -> Iterator[Check]:
     figures = {
         "pins": " and ".join(f"GPIO{gpio}" for gpio in bench.pins), "tick_Hz": signals.tick_Hz,
         "sample_Hz": signals.sample_Hz, "full": signals.compare_max, "sets": len(runs.followed),
-        "names": ", ".join(bench.names[role] for role in INPUTS), "watchdog_ms": 1e3 * bench.watchdog_s,
+        "names": ", ".join(bench.names[role] for role in runs.inputs), "watchdog_ms": 1e3 * bench.watchdog_s,
         "trip": bench.board["TRIP_GPIO"], "parts": runs.drive.sampling.samples if runs.drive else 0,
     }  # fmt: skip
     applies = {requirements.HARDWARE_SOLENOIDS: bench.two, requirements.HARDWARE_CURRENT: runs.drive is not None}

@@ -166,18 +166,17 @@ class Bench:
         self._target, self._user, self._failure = manifest.target, board.code, ""
         target = compensator.target
         drive = compensator.current_drive
-        shunts = drive.loop.shunts if drive else 1
-        roles = ("COMMAND", "PRESSURE_A", "PRESSURE_B", "CURRENT", "SUPPLY", "CURRENT_B")
-        names = dict(zip(roles, self.device.channels, strict=False))
-        roles = (*roles[:4], *(roles[5:] if shunts == 2 else ()), roles[4])
-        if target and target.channels:
-            names = dict(zip(roles, target.channels, strict=False))
+        shunts = ("CURRENT", "CURRENT_B")[: drive.loop.shunts if drive else 1]
+        roles = ["COMMAND", *(f"PRESSURE_{name}" for name in compensator.signals.pressures), *shunts, "SUPPLY"]
+        usual = {"COMMAND": "A0", "PRESSURE_A": "A1", "PRESSURE_B": "A2", "PRESSURE_C": "A6"}
+        usual |= {"CURRENT": "A3", "CURRENT_B": "A5", "SUPPLY": "A4"}
+        declared = target.channels if target else ()
+        self.names = dict(zip(roles, declared or [usual[role] for role in roles], strict=False))
         self.crystal_Hz = (target.crystal_Hz if target else None) or self.device.crystal_Hz
-        self.names = {role: names[role] for role in roles if role in names}
         #: Numbers of the declared channels, by what they carry.
         self.channels = {role: self.device.channels.index(name) for role, name in self.names.items()}
         #: Those of the shunts, that of solenoid A first; of one solenoid, or one shunt, one.
-        self.shunts = [self.channels[role] for role in ("CURRENT", "CURRENT_B")[:shunts] if drive]
+        self.shunts = [self.channels[role] for role in shunts if drive]
         self.two = len(compensator.signals.signs) == 2
         if board.lacking:
             raise RequirementError(f"dz_board.h has no DZ_BOARD_{board.lacking[0]}, which the firmware needs")
