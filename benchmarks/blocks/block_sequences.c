@@ -110,8 +110,8 @@ static void make_sound(uint16_t *code, uint16_t zero_first, uint16_t turned)
     const uint16_t low = code[1] < code[2] ? code[1] : code[2], high = code[1] < code[2] ? code[2] : code[1];
 
     code[0] = clipped(zero_first != 0u ? dz_block.command_zero : code[0], dz_block.command_low, dz_block.command_high);
-    code[1] = clipped(turned != 0u ? (uint16_t)(low / 4u) : high, dz_block.a_low, dz_block.a_high);
-    code[2] = clipped(turned != 0u ? high : low, dz_block.b_low, dz_block.b_high);
+    code[1] = clipped(turned != 0u ? (uint16_t)(low / 4u) : high, dz_block.sensors[0].low, dz_block.sensors[0].high);
+    code[2] = clipped(turned != 0u ? high : low, dz_block.sensors[1].low, dz_block.sensors[1].high);
 }
 
 static void run_drive(void)
@@ -211,7 +211,7 @@ static void run_current(void)
 
     calibrate_both();
     for (uint32_t tick = 0u; tick < TICKS; tick++) {
-        uint16_t sum;
+        uint16_t sum, asked[2] = {0u, 0u};
 
         after_fault = (by_block.faults != 0u) ? (uint16_t)(after_fault + 1u) : 0u;
         if (after_fault > 12u) {
@@ -229,7 +229,8 @@ static void run_current(void)
         left--;
         sum = (corner != 0u) ? (uint16_t)(corner + below(3u) - 1u) : sum_of(&flow, any());
         supply = (uint16_t)(supply + below(3u) - 1u);
-        TICK_BOTH(set_point, sum, supply);
+        asked[(way >> 9) % SOLENOIDS] = set_point;
+        TICK_BOTH(asked, sum, supply);
         compare_loops();
     }
 }

@@ -27,7 +27,7 @@ from dzdesign.verify.exhaustive.drive_check import CompiledDrive, PreparedDrive
 from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4, HOST, Machine
 from tests.support.block_cores import block_folder
 from tests.support.core_texts import texts
-from tests.support.current_loops import LOOPS, current_texts
+from tests.support.current_loops import LOOPS, current_texts, shape_of
 
 PROGRAM = "block_sequences.c"
 #: Samples of the drive and ticks of the controller; of the states against the exact controller.
@@ -114,7 +114,7 @@ class Program:
 
 def drive_program(forms: TwoForms, seed: int, machines: tuple[Machine, ...] = (HOST, CORTEX_M4, AVR)) -> Program:
     """Return the comparison of a design's drive functions."""
-    swapped = f"#define SWAPPED {int(built_for(forms.compensator).has('SWAPPED'))}\n"
+    swapped = f"#define SWAPPED {int(built_for(forms.compensator).pair(-1) == 'BA')}\n"
     return Program(
         block=forms.block,
         headers={
@@ -154,12 +154,15 @@ def controller_program(
     """Return the comparison of a current controller; of the compensator are the other numbers of the block."""
     core, block = controller_in_block_form(compensator, loop)
     supply = ", supply" * (loop.supply is not None)
-    forms = {"block": f"dz_current_tick(&dz_block, &by_block, set_point, sum{supply})",
-             "fixed": f"dz_current_tick_fixed(&by_fixed, set_point, sum{supply})"}  # fmt: skip
-    type_of_supply = ", uint16_t supply" * (loop.supply is not None)
-    tick = f"void dz_current_tick_fixed(struct dz_current *loop, uint16_t set_point, uint16_t sum{type_of_supply});\n"
-    tick += f"#define TICK_BOTH(set_point, sum, supply) ((void)(supply), {forms['block']}, {forms['fixed']})\n"
-    tick += f"#define OFFSET_SUMS {1 << loop.offset_shift}u\n#define OFFSET_NOMINAL {loop.offset_nominal}u\n"
+    asked = "(asked)[0], (asked)[1]" if loop.two else "(asked)[0]"
+    forms = {"block": f"dz_current_tick(&dz_block, &by_block, {asked}, sum{supply})",
+             "fixed": f"dz_current_tick_fixed(&by_fixed, {asked}, sum{supply})"}  # fmt: skip
+    words = ["set_point", *(["other"] if loop.two else []), "sum", *(["supply"] if loop.supply else [])]
+    types = ", ".join(f"uint16_t {word}" for word in words)
+    tick = f"void dz_current_tick_fixed(struct dz_current *loop, {types});\n"
+    tick += f"#define TICK_BOTH(asked, sum, supply) ((void)(supply), {forms['block']}, {forms['fixed']})\n"
+    tick += f"#define SOLENOIDS {1 + loop.two}u\n#define OFFSET_SUMS {loop.offset_ticks}u\n"
+    tick += f"#define OFFSET_NOMINAL {loop.offset_nominal}u\n"
     full = min((loop.full_counts << loop.current_shift) // loop.current_gain, LAST - loop.offset_nominal)
     # Full drive's current, sum of codes over 2^16 a PWM count.
     tick += f"#define FULL_SUM UINT32_C({min((full << 16) // max(loop.compare_limit, 1), 2**16)})\n"
@@ -185,7 +188,7 @@ def controller_program(
 
 def controller_in_block_form(compensator: Compensator, loop: CurrentLoop) -> tuple[dict[str, bytes], CalibrationBlock]:
     """Return the core in block form of a firmware with that controller, and its block."""
-    built = replace(built_for(compensator), shape=8 + 16 * bool(loop.supply), samples=loop.samples)
+    built = replace(built_for(compensator), shape=shape_of(loop), samples=loop.samples)
     block = replace(block_of(compensator, "0" * 64), shape=built.shape, current=current_block(loop))
     return {name: text.encode() for name, text in texts(block_core_files(built)).items()}, block
 

@@ -41,7 +41,7 @@ def random_texts(draw: random.Random, *, two_sided: bool) -> dict[str, str]:
         "pressure_span": f"{span} MPa",
         "pressure_a": seldom(0.5, f"4..20 mA on {ohm_a} ohm = {draw.choice(SPANS_MPA)} MPa"),
         "pressure_b": seldom(0.5, f"4..20 mA on {ohm_b} ohm = {draw.choice(SPANS_MPA)} MPa"),
-        "negative_dp": (seldom(0.5, "swapped") or "wired") if both else "",
+        "negative_dp": (seldom(0.5, "B-A") or "wired") if both else "",
         "ramp_up": seldom(0.4, _ramps(draw)),
         "ramp_down": seldom(0.4, _ramps(draw)),
         "hysteresis": "play" if hysteresis < 0.3 else "",

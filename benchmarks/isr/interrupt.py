@@ -39,6 +39,7 @@ ENTRY = """\
 #include "dz_isr.h"
 extern uint16_t ticks_to_sample;
 extern struct dz_drive drive;
+extern struct dz_state state;
 extern struct dz_current loop;
 extern volatile uint16_t dz_board_u_adc, dz_board_p_a_adc, dz_board_p_b_adc, dz_board_current_sum, dz_board_compare_a;
 uint16_t dz_comp(uint16_t u, uint16_t p_a, uint16_t p_b);
@@ -50,14 +51,15 @@ uint16_t dz_comp(uint16_t u, uint16_t p_a, uint16_t p_b)
         dz_isr_init(0u);
         dz_untrip_output();
         loop.faults = 0u;
-        dz_state.released = 1u;
+        state.released = 1u;
     }
     dz_board_u_adc = u;
     dz_board_p_a_adc = p_a;
     dz_board_p_b_adc = p_b;
     dz_board_current_sum = SUM;
-    dz_state.ticks_without_sample = 0u;
+    state.ticks_without_sample = 0u;
     ticks_to_sample = FRESH;
+    KEPT
     dz_isr();
     return dz_board_compare_a;
 }
@@ -66,9 +68,9 @@ EMPTY = re.compile(r"void dz_isr\(void\)\n\{.*?\n\}\n", re.DOTALL)
 
 
 def with_current(compensator: Compensator) -> Compensator:
-    """Return a compensator with current control of the example's coil."""
-    drive = design_current_drive(REQUEST, compensator.signals.compare_max)
-    return replace(compensator, current_drive=drive)
+    """Return a compensator with current control of the example's coil, of two solenoids with one shunt for both."""
+    request = replace(REQUEST, solenoids=len(compensator.signals.signs))
+    return replace(compensator, current_drive=design_current_drive(request, compensator.signals.compare_max))
 
 
 def _sources(compensator: Compensator) -> dict[str, str]:
@@ -76,13 +78,11 @@ def _sources(compensator: Compensator) -> dict[str, str]:
     wanted = ("core/", "cortex_m4/dz_isr.", "cortex_m4/dz_board.", "cortex_m4/dz_hardware.")
     found = {path.rpartition("/")[2]: text for path, text in files.items() if path.startswith(wanted)}
     found = {name.replace("dz_comp", "dz_law"): text.replace("dz_comp", "dz_law") for name, text in found.items()}
-    for file, shown in (("dz_isr.c", ("struct dz_drive drive", "struct dz_current loop")),
+    for file, shown in (("dz_isr.c", ("struct dz_state state", "struct dz_drive drive", "struct dz_current loop")),
                         ("dz_board.c", ("uint16_t ticks_to_sample",))):  # fmt: skip
         for name in shown:
             found[file] = found[file].replace(f"static {name}", name)
-    # Copies for people: show_drive() has them all, and one value that is written.
-    written = found["dz_isr.c"].replace("dz_write_compare_a(dz_state.compare_a)", "dz_write_compare_a(loop.compare)")
-    found["dz_isr.c"] = written.replace("    show_drive();\n", "")
+    found["dz_isr.c"] = found["dz_isr.c"].replace("    show();\n", "")
     return found
 
 
@@ -98,7 +98,11 @@ def count_interrupt(compensator: Compensator, inputs: Sequence[Codes], folder: P
     """Count the interrupt of a compensator with current control, with a new sample or without."""
 
     def counted(sources: Mapping[str, str], name: str) -> Counts:
+        # Zero command has been seen; and the sum is the same on both sides, so that the current of neither ends.
+        two, samples = len(compensator.signals.signs) == 2, compensator.drive_functions.fault_samples
+        kept = f"drive.valid_commands = {samples}u; loop.held_ticks = 0u;" if two else ""
         entry = ENTRY.replace("FRESH", "0u" if fresh else "1u").replace("SUM", f"{_sum(compensator)}u")
+        entry = entry.replace("KEPT", kept)
         contender = Contender(name=name, made="", sources={**sources, "entry.c": entry})
         return on_cortex_m4.count(contender, inputs, folder / name)
 

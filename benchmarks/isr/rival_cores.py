@@ -73,7 +73,7 @@ def _naive_double(c: Compensator) -> Contender:
 #include <stdint.h>
 
 static const double dp_node[{len(betas)}] = {{
-{_rows([_double(signals.dp_MPa(index * c.beta_step_codes)) for index in range(len(betas))])}
+{_rows([_double(signals.pair(1).dp_MPa(index * c.beta_step_codes)) for index in range(len(betas))])}
 }};
 static const double beta_node[{len(betas)}] = {{
 {_rows([_double(value) for value in betas])}
@@ -91,7 +91,7 @@ static const double beta_node[{len(betas)}] = {{
         return 0;
     }}
     if (p_a_adc <= {signals.code_max}u && p_b_adc <= {signals.code_max}u
-        && dp > {_double(signals.dp_MPa(-c.reverse_codes) - signals.dp_MPa(1) / 2)}) {{
+        && dp > {_double(signals.pair(1).dp_MPa(-c.reverse_codes) - signals.pair(1).dp_MPa(1) / 2)}) {{
         int i = 0;
 
         if (dp <= 0.0) {{

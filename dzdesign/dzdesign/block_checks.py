@@ -170,8 +170,7 @@ def _hashes_in(folder: Path) -> Mapping[str, Path]:
 
 #: Entries of a block that say whose it is, how it is shown, and what every input tries.
 OF_ONE_VALVE = (
-    "compensator_sha256", "serial", "record", "u_max_uV", "a_span_Pa", "b_span_Pa", "a_full", "b_full", "sides",
-    "crc32",
+    "compensator_sha256", "serial", "record", "u_max_uV", "sensors", "sides", "crc32",
 )  # fmt: skip
 #: Blocks that a sentence names.
 NAMED = 3
@@ -212,8 +211,11 @@ def drives_checked(folder: Path, blocks: Iterable[Tried]) -> Iterator["Check"]:
 def _settings(block: "CalibrationBlock") -> tuple[object, ...]:
     """Return what the drive around the law follows, but for the widths of a play."""
     shared = [getattr(block, each.name) for each in fields(block) if each.name not in (*OF_ONE_VALVE, "current")]
-    sides = [(side.ramp_up, side.ramp_down, side.span, any(side.play)) for side in block.sides]
-    return (*shared, *sides, astuple(block.current))
+    sensors = [(sensor.zero, sensor.low, sensor.high) for sensor in block.sensors]
+    sides = [
+        (side.balance, side.weight, side.ramp_up, side.ramp_down, side.span, any(side.play)) for side in block.sides
+    ]
+    return (*shared, *sensors, *sides, astuple(block.current))
 
 
 #: Files that a sentence names.

@@ -75,12 +75,13 @@ def test_the_drive_is_the_same_after_every_call_and_a_wrong_number_is_seen(forms
         assert drive_program(other, 1, (HOST,)).run(HOST, 60_000).unlike, wrong
 
 
-def test_the_controller_is_the_same_after_every_call_and_a_wrong_number_is_seen(forms, monkeypatch):
-    compensator, loop = forms.compensator, LOOPS["supply"]
+@pytest.mark.parametrize("controller", ["supply", "two shunts"])
+def test_the_controller_is_the_same_after_every_call_and_a_wrong_number_is_seen(forms, controller, monkeypatch):
+    compensator, loop = forms.compensator, LOOPS[controller]
     found = controller_program(compensator, loop, 1, (HOST,)).run(HOST, 60_000)
     assert found.unlike == 0 and found.steps > 60_000
     in_block_form = block_sequences.controller_in_block_form
-    for name in ("integral", "over_ticks", "open_sum", "offset_high", "supply_low"):
+    for name in ("integral", "over_ticks", "open_sum", "offset_high", "supply_low", *["held_ticks"][: loop.two]):
 
         def wrong(*given, name=name):
             core, block = in_block_form(*given)

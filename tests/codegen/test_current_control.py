@@ -41,10 +41,26 @@ def test_without_a_word_the_drive_is_by_duty(example_compensator):
     assert not [path for path in generate(example_compensator, "f28335").files if "dz_current" in path]
 
 
-def test_a_command_of_both_signs_is_refused(example_valve):
-    both = options(**CURRENT | {"command_signal": "-10..10 V x 0.15 + 1.5 V"})
-    with pytest.raises(InputError, match="--drive"):
-        both.current_drive()
+BOTH = {"command_signal": "-10..10 V x 0.15 + 1.5 V"}
+EACH = {"current_signal": f"{CURRENT['current_signal']} each"}
+
+
+@pytest.mark.parametrize("texts", [BOTH, BOTH | EACH], ids=["one shunt", "two shunts"])
+def test_a_command_of_both_signs_has_two_solenoids(texts):
+    """The loop is that of one solenoid, with the same margins: one solenoid at a time is driven."""
+    one, two = options(**CURRENT).current_drive(), options(**CURRENT | texts).current_drive()
+    assert (one.loop.two, two.loop.two, two.loop.shunts) == (False, True, 1 + (texts != BOTH))
+    assert replace(two, loop=one.loop) == one
+    assert replace(two.loop, held_ticks=0, shunts=1) == one.loop and two.loop.held_ticks == two.rest_ticks
+    assert two.decayed_A == pytest.approx(0.02)
+    # The longest time constant, from 1.2 times the rated current to a fiftieth of it: the diode brakes.
+    tau, diode_A = 0.04 * 1.5 / (3.5 * 0.75 + 0.5), 0.7 / (3.5 * 0.75 + 0.5)
+    assert two.change_s == pytest.approx(tau * log((1.2 + diode_A) / (0.02 + diode_A)) + 5 / 2500)
+
+
+def test_a_shunt_for_each_of_one_solenoid_is_refused():
+    with pytest.raises(InputError, match="each"):
+        options(**CURRENT | EACH)
 
 
 def test_compensator_json_keeps_the_drive(controlled):

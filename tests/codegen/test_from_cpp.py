@@ -66,5 +66,5 @@ def test_the_core_links_with_a_program_of_cpp(form, tmp_path):
     run("gcc", "-std=c99", *folders, "-c", *sources, cwd=tmp_path)
     run("g++", *folders, "main.cpp", *(str(path) for path in sorted(tmp_path.glob("*.o"))), "-o", "main", cwd=tmp_path)
     compensator = golden_compensator("host", FULL)
-    expected = compensator.compare(3000, compensator.signals.difference(2400, 1500, 1), 1)
+    expected = compensator.compare(3000, compensator.signals.pair(1).difference(2400, 1500), 1)
     assert int(run("./main", cwd=tmp_path)) == expected

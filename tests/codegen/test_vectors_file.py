@@ -72,12 +72,12 @@ def test_every_node_corner_and_fault_is_among_the_fewest(name, firmwares):
         for row in sound:
             away = signals.command.direction(sign) * (row[0] - signals.command.zero_code)
             by_drop.setdefault(signals.difference(row[1], row[2], sign), {})[away] = row[column]
-        largest, step = signals.largest_difference(sign), compensator.beta_step_codes
+        largest, step = signals.pair(sign).largest_difference, compensator.beta_step_codes
         nodes = {node + by for node in range(0, largest + 1, step) for by in (-1, 0, 1)}
         for drop in (drop for drop in nodes if drop <= largest):
             assert 0 in by_drop[drop] and any(away >= max(compensator.transition_end, 1) for away in by_drop[drop])
         reverse, span = compensator.reverse_codes, signals.command.span(sign)
-        tested_to = int(signals.dp_code(compensator.side(sign).certificate.dp_MPa[1]))
+        tested_to = int(signals.pair(1).dp_code(compensator.side(sign).certificate.dp_MPa[1]))
         assert {-reverse - 1, -reverse, tested_to, tested_to + 1, largest} <= set(by_drop)
         corners = {compensator.zero_band_codes, compensator.transition_end, span}
         around = {corner + by for corner in corners for by in (-1, 0, 1)}

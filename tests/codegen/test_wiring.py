@@ -108,7 +108,8 @@ def test_zero_command_gives_what_the_law_gives(firmware, target):
     compensator = compensator_of(folder)
     zero, said = compensator.signals.command.zero_code, step(readme(folder, target), 3)
     for sign, name in ((1, "a"), (-1, "b")):
-        values = [compensator.compare(zero, dp, sign) for dp in range(compensator.signals.largest_difference(sign) + 1)]
+        largest = compensator.signals.pair(sign).largest_difference
+        values = [compensator.compare(zero, dp, sign) for dp in range(largest + 1)]
         assert f"`compare_{name}` is {min(values)} to {max(values)}" in said
 
 

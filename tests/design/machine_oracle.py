@@ -40,7 +40,7 @@ def read_codes(compensator, machine, dp_MPa: float, back_MPa: float, converter) 
 
     ahead = codes(signals.pressure_a, dp_MPa + back_MPa, machine.pressure_error_a_MPa)
     behind = codes(signals.pressure_b, back_MPa, machine.pressure_error_b_MPa)
-    return {signals.difference(*pair) for pair in product((min(ahead), max(ahead)), (min(behind), max(behind)))}
+    return {signals.pair(1).difference(*pair) for pair in product((min(ahead), max(ahead)), (min(behind), max(behind)))}
 
 
 def threshold_factors(machine) -> tuple[list[float], float]:

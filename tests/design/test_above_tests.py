@@ -88,15 +88,16 @@ class TestDrive:
 
     def test_the_tests_keep_their_offset(self, made):
         for dp in TESTED:
-            code = round(made["hold"].signals.dp_code(Fraction(dp)))
+            code = round(made["hold"].signals.pair(1).dp_code(Fraction(dp)))
             offsets = [float(each.beta(code) * each.positive.u_min0_over_u_max) for each in made.values()]
             assert min(offsets) > max(offsets) - 1e-3
 
     def test_let_go_nothing_but_one_unit_is_left_two_segments_above_the_tests(self, made):
         released = made["release"]
-        side, node = released.positive, round(released.signals.dp_code(Fraction(5))) // released.beta_step_codes + 2
+        side, pair = released.positive, released.signals.pair(1)
+        node = round(pair.dp_code(Fraction(5))) // released.beta_step_codes + 2
         assert set(side.beta[node:]) == {1} and side.beta[node - 1] > 1 and min(side.transition_beta) > 1
-        assert side.certificate.released_from_MPa == released.signals.dp_MPa(node * released.beta_step_codes)
+        assert side.certificate.released_from_MPa == pair.dp_MPa(node * released.beta_step_codes)
 
 
 def test_of_one_test_the_offset_is_held_and_said_to_be():
@@ -144,7 +145,7 @@ class TestFaults:
 
     def test_a_drive_above_the_continued_bound(self, lowered):
         exact, found, drive = self.drives(lowered)
-        dp = found.values * float(exact.a.per_code_MPa)
+        dp = found.values * float(exact.ahead.per_code_MPa)
         drive[(dp > 7) & (dp < 7.1)] += 60
         assert check_above(exact, found, drive).over_compensated > 0
 

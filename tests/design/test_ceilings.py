@@ -21,7 +21,7 @@ from dzdesign.design.signals import Signals
 from dzdesign.identify.valve.certified_bound import BoundPiece, CertifiedBound
 
 SIGNALS = Signals()
-CODES = SIGNALS.largest_difference(1)
+CODES = SIGNALS.pair(1).largest_difference
 #: Two numbers that are one double, and on either side of it others.
 CLOSE = [Fraction(10**30 + step, 3 * 10**30) for step in (1, 0, 2, 1)]
 
@@ -34,7 +34,7 @@ def bound_of(nodes, values):
 def curve_of(seed, *, above=True, hold=True, on_codes=False):
     """Return a curve under a bound that goes on above the tests; on request with corners on whole codes."""
     rng = random.Random(seed)
-    step = SIGNALS.dp_MPa(1) if on_codes else Fraction(1, 10**7)
+    step = SIGNALS.pair(1).dp_MPa(1) if on_codes else Fraction(1, 10**7)
     tests = sorted(rng.sample(range(round(Fraction(1, 2) / step), round(6 / step)), 4))
     nodes = [place * step for place in tests]
     lower = [Fraction(rng.randrange(40_000_000, 52_000_000), 10**7) for _ in nodes]
@@ -59,18 +59,18 @@ def curve_of(seed, *, above=True, hold=True, on_codes=False):
 @pytest.mark.parametrize("seed", range(6))
 def test_a_row_is_the_curve_at_every_code(seed):
     curve = curve_of(seed, above=seed < 4, hold=seed % 3 > 0, on_codes=seed % 2 > 0)
-    places = [*range(-6, CODES + 6, 7), *(round(SIGNALS.dp_code(node)) for node in curve.dp_MPa)]
-    certified, offset = (row(curve, SIGNALS, -6, CODES + 6) for row in (certified_row, offset_row))
+    places = [*range(-6, CODES + 6, 7), *(round(SIGNALS.pair(1).dp_code(node)) for node in curve.dp_MPa)]
+    certified, offset = (row(curve, SIGNALS.pair(1), -6, CODES + 6) for row in (certified_row, offset_row))
     assert len(certified) == CODES + 13
     for code in places:
-        dp_MPa = SIGNALS.dp_MPa(code)
+        dp_MPa = SIGNALS.pair(1).dp_MPa(code)
         assert certified[code + 6] == certified_V(curve, dp_MPa), code
         assert offset[code + 6] == curve.at(dp_MPa), code
 
 
 def test_corners_on_whole_codes_are_met():
     """Else the test above would say nothing of them."""
-    assert any(SIGNALS.dp_code(node).denominator == 1 for node in curve_of(1, on_codes=True).dp_MPa)
+    assert any(SIGNALS.pair(1).dp_code(node).denominator == 1 for node in curve_of(1, on_codes=True).dp_MPa)
 
 
 def test_a_curve_above_its_bound_is_refused_where_it_first_is():
@@ -82,7 +82,7 @@ def test_a_curve_above_its_bound_is_refused_where_it_first_is():
     refused = []
     for code in range(CODES):
         try:
-            certified_V(high, SIGNALS.dp_MPa(code))
+            certified_V(high, SIGNALS.pair(1).dp_MPa(code))
         except RequirementError as error:
             refused.append(str(error))
             break
@@ -121,23 +121,23 @@ def test_doubles_alone_would_be_wrong(monkeypatch):
 
 def test_a_corner_that_has_one_bound_alone_is_seen(monkeypatch):
     """The fault that the rows' test must see: a bound that jumps at a test has there the lower of both sides."""
-    nodes = [SIGNALS.dp_MPa(code) for code in (200, 400, 600)]
+    nodes = [SIGNALS.pair(1).dp_MPa(code) for code in (200, 400, 600)]
     pieces = (BoundPiece(nodes[0], nodes[1], Fraction(5), Fraction(5)),
               BoundPiece(nodes[1], nodes[2], Fraction(4), Fraction(4)))  # fmt: skip
     curve = OffsetCurve(
         dp_MPa=tuple(nodes), offset_V=(Fraction(4),) * 3, certified=CertifiedBound(pieces=pieces), hold_below_MPa=None
     )
-    assert certified_row(curve, SIGNALS, 400, 400)[0] == certified_V(curve, nodes[1]) == 4
+    assert certified_row(curve, SIGNALS.pair(1), 400, 400)[0] == certified_V(curve, nodes[1]) == 4
     high = OffsetCurve(
         dp_MPa=tuple(nodes), offset_V=(Fraction(9, 2), Fraction(9, 2), Fraction(4)), certified=curve.certified,
         hold_below_MPa=None,
     )  # fmt: skip
     with pytest.raises(RequirementError):
-        certified_row(high, SIGNALS, 400, 400)
+        certified_row(high, SIGNALS.pair(1), 400, 400)
     bounds = ceilings._bounds
     monkeypatch.setattr(ceilings, "_bounds", lambda *given: list(bounds(*given))[:1])
     ceilings.KNOWN.clear()
-    assert certified_row(high, SIGNALS, 400, 400)[0] == Fraction(9, 2)
+    assert certified_row(high, SIGNALS.pair(1), 400, 400)[0] == Fraction(9, 2)
     ceilings.KNOWN.clear()
 
 

@@ -182,9 +182,9 @@ def test_the_dead_zone_between_the_tests_counts():
     middle = [test.dp_MPa for test in valve.positive.tests]
     knees = [test.u_knee_rising_V for test in valve.positive.tests]
     found = []
-    first, last = (round(made_off.signals.dp_code(Fraction(dp))) for dp in (1, 5))
+    first, last = (round(made_off.signals.pair(1).dp_code(Fraction(dp))) for dp in (1, 5))
     for code in range(first, last + 1):
-        knee = np.interp(float(made_off.signals.dp_MPa(code)), middle, knees) / 10
+        knee = np.interp(float(made_off.signals.pair(1).dp_MPa(code)), middle, knees) / 10
         found.append(corners_of(made_off, code, 1).command_at(knee))
     assert off.onset == pytest.approx(max(found), abs=1e-3) and off.onset > 1.1 * at_tests
 
@@ -198,7 +198,7 @@ def test_the_dead_zone_at_the_other_end_of_the_machine_is_that_of_the_law(
     factor, span = made.machine.largest_factor, made.signals.command.span(1)
     first = []
     for test in made.valve.positive.tests:
-        dp_code = round(made.signals.dp_code(Fraction(repr(test.dp_MPa))))
+        dp_code = round(made.signals.pair(1).dp_code(Fraction(repr(test.dp_MPa))))
         knee = factor * Fraction(repr(test.u_knee_rising_V)) / made.u_max_V
         drives = (made.drive(made.signals.command.zero_code + code, dp_code, 1) for code in range(span + 1))
         first.append(next((code for code, drive in enumerate(drives) if drive >= knee), None))

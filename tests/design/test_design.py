@@ -47,8 +47,8 @@ def designed(request):
 def test_zero_command_stays_under_the_true_closing_threshold_at_every_pressure_code(designed):
     valve, compensator, threshold = designed
     low, high = valve.positive.valid_dp_MPa
-    for code in range(compensator.signals.largest_difference(1) + 1):
-        dp = float(compensator.signals.dp_MPa(code))
+    for code in range(compensator.signals.pair(1).largest_difference + 1):
+        dp = float(compensator.signals.pair(1).dp_MPa(code))
         if low <= dp <= high:
             drive = compensator.compare(0, code) / compensator.signals.compare_max * 10
             assert drive < threshold(dp) - 0.1
@@ -56,7 +56,7 @@ def test_zero_command_stays_under_the_true_closing_threshold_at_every_pressure_c
 
 def test_beta_never_exceeds_one_up_to_the_reference(designed):
     valve, compensator, _ = designed
-    code = int(compensator.signals.dp_code(Fraction(repr(valve.positive.reference.dp_MPa))))
+    code = int(compensator.signals.pair(1).dp_code(Fraction(repr(valve.positive.reference.dp_MPa))))
     assert all(compensator.beta(each) <= 1 + Fraction(1, 1000) for each in range(code + 1))
 
 
@@ -92,7 +92,7 @@ def test_halves_round_up():
 def test_failed_sensor_takes_the_smallest_beta(example_compensator):
     c = example_compensator
     assert c.beta(-c.reverse_codes) == c.beta(0)
-    assert c.beta(-c.reverse_codes - 1) == min(c.beta(code) for code in range(c.signals.largest_difference(1) + 1))
+    assert c.beta(-c.reverse_codes - 1) == min(c.beta(code) for code in range(c.signals.pair(1).largest_difference + 1))
 
 
 def with_curve(side, **changes):
@@ -120,10 +120,10 @@ def test_a_law_that_would_fall_with_command_is_refused():
 def test_loss_against_the_certified_curve_is_small(example_valve, example_compensator):
     """The table gives away little: on average under a count of command noise, 5 mV."""
     side, c = example_valve.positive, example_compensator
-    low, high = (round(float(c.signals.dp_code(Fraction(repr(dp))))) for dp in side.valid_dp_MPa)
+    low, high = (round(float(c.signals.pair(1).dp_code(Fraction(repr(dp))))) for dp in side.valid_dp_MPa)
     codes = np.arange(low, high + 1)
     table = np.array([float(c.drive(0, int(code))) for code in codes]) * 10
-    dp = np.array([float(c.signals.dp_MPa(int(code))) for code in codes])
+    dp = np.array([float(c.signals.pair(1).dp_MPa(int(code))) for code in codes])
     curve, held = np.interp(dp, side.curve.offset_dp_MPa, side.curve.offset_V), side.curve.u_min0_V
     loss = np.minimum(curve, np.where(dp <= side.reference.dp_MPa, held, 99)) - table
     assert loss.min() > 0
@@ -132,7 +132,7 @@ def test_loss_against_the_certified_curve_is_small(example_valve, example_compen
 
 def test_full_command_gives_full_drive_at_the_reference(example_compensator):
     # The law starts below the knee; its travel is counted from there, so no flow is lost at the top.
-    code = int(example_compensator.signals.dp_code(Fraction(1)))
+    code = int(example_compensator.signals.pair(1).dp_code(Fraction(1)))
     assert example_compensator.compare(4095, code) >= 59990
 
 
@@ -170,7 +170,7 @@ def test_it_runs_from_the_certified_offset_to_the_opening_law_without_a_step(wit
 def test_the_transition_ends_at_or_above_the_opening_threshold_at_every_test(with_transition, example_valve):
     signals = with_transition.signals
     for test in example_valve.positive.tests:
-        code = round(signals.dp_code(Fraction(repr(test.dp_MPa))))
+        code = round(signals.pair(1).dp_code(Fraction(repr(test.dp_MPa))))
         assert float(with_transition.drive(with_transition.transition_end, code)) * 10 > test.u_knee_rising_V
 
 

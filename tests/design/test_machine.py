@@ -89,7 +89,8 @@ def test_the_budget_adds_up_to_the_ceiling(designed):
     limit = offset_ceiling(curve, designed.u_max_V, designed.allowance(1)).limit
     curve_V = designed.valve.positive.certified["closing"].u_threshold_V
     for at, dp in enumerate(budget.dp_MPa):
-        code = min(round(signals.dp_code(Fraction(repr(dp)))), int(signals.dp_code(Fraction(repr(budget.dp_MPa[-1])))))
+        last = int(signals.pair(1).dp_code(Fraction(repr(budget.dp_MPa[-1]))))
+        code = min(round(signals.pair(1).dp_code(Fraction(repr(dp)))), last)
         assert budget.threshold_V[at] <= curve_V[at] + 2e-3
         assert budget.ceiling_V[at] == pytest.approx(float(limit[code] * designed.u_max_V), abs=1e-6)
         assert designed.beta(code) * designed.positive.u_min0_over_u_max <= limit[code]
@@ -145,7 +146,7 @@ def test_an_edited_machine_or_budget_is_refused(example_valve):
 def test_a_table_edited_beyond_the_tests_is_refused(example_valve):
     """Sensors that read 5 MPa as 5.2 take the law there: its table is part of the certificate too."""
     made = made_for(example_valve, MACHINES["amplifier"] | {"transition": "off"})
-    node = int(made.signals.dp_code(Fraction(5))) // made.beta_step_codes + 2
+    node = int(made.signals.pair(1).dp_code(Fraction(5))) // made.beta_step_codes + 2
     table = tuple(made.positive.beta[0] if place == node else each for place, each in enumerate(made.positive.beta))
     with pytest.raises(RequirementError):
         with_certificates(replace(made, sides=replace(made.sides, positive=replace(made.positive, beta=table))))
@@ -209,9 +210,10 @@ class TestTheBenchsGaugeAboveTheTests:
         last = bound.dp_MPa[0]
         gain, factor = 1 + Fraction(repr(machine.bench_pressure_error_MPa)) / last, machine.least_factor
         worst = []
-        for code in range(int(designed.signals.dp_code(last)) + 1, int(designed.signals.dp_code(Fraction(10)))):
+        pair = designed.signals.pair(1)
+        for code in range(int(pair.dp_code(last)) + 1, int(pair.dp_code(Fraction(10)))):
             drive = Fraction(designed.compare(designed.signals.command.zero_code, code), designed.signals.compare_max)
-            at_MPa = designed.signals.dp_MPa(code) * gain
+            at_MPa = pair.dp_MPa(code) * gain
             known = bound.at(at_MPa)
             if known is None or known <= 0:  # nothing is known there, and one unit of the table is left
                 break

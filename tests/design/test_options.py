@@ -72,7 +72,7 @@ REFUSED = [
     ({"amplifier": "60 %"}, "--amplifier"),
     ({"amplifier": "1"}, "--amplifier"),
     (AMPLIFIER | {"pressure_converter": "15 codes"}, "--pressure-converter"),
-    (AMPLIFIER | {"pressure_error": "0.1 % / 1 % / 2 %"}, "--pressure-error"),
+    (AMPLIFIER | {"pressure_error": "0.1 % / 1 % / 2 % / 3 %"}, "--pressure-error"),
     (AMPLIFIER | {"bench_pressure_error": "-1 MPa"}, "--bench-pressure-error"),
     # Debounce, latch and interlock.
     ({"fault_debounce": "0 samples"}, "--fault-debounce is 0 samples, expected 1 to 10000"),
@@ -127,7 +127,7 @@ def test_the_command_line_refuses_and_writes_nothing(example_valve, tmp_path, ca
     path, output = tmp_path / "valve.json", tmp_path / "compensator.json"
     path.write_bytes(to_json_bytes(example_valve))
     for given, words in (
-        (("--negative-dp", "swapped"), "--negative-dp is for a command of both signs"),
+        (("--negative-dp", "B-A"), "--negative-dp is for a command of both signs"),
         (("--ramp-down", "1 s / 2 s"), "the second time of --ramp-down is for a command of both signs"),
     ):
         assert main(["design", str(path), *given, "-o", str(output)]) == 2
@@ -237,6 +237,6 @@ def test_a_valve_without_an_opening_branch_has_no_transition_unless_asked(exampl
 
 def test_below_the_reference_beta_is_held_or_extended(example_valve):
     held, extended = (designed(example_valve, below_dp0=below, transition="off") for below in ("hold", "extend"))
-    below, above = (round(held.signals.dp_code(dp)) for dp in (Fraction(6, 10), Fraction(3)))
+    below, above = (round(held.signals.pair(1).dp_code(dp)) for dp in (Fraction(6, 10), Fraction(3)))
     assert held.beta(below) <= 1 < extended.beta(below)
     assert held.compare(0, above) == pytest.approx(extended.compare(0, above), abs=2)

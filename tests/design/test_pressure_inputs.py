@@ -4,15 +4,17 @@ import random
 import re
 from dataclasses import replace
 from fractions import Fraction
+from typing import get_args
 
 import numpy as np
 import pytest
 
 from dzdesign.codegen.project import targets
+from dzdesign.core.artefact_types import RuleError
 from dzdesign.core.errors import InputError
-from dzdesign.design.pressure_inputs import hidden_failure, wiring_in_words
+from dzdesign.design.pressure_inputs import hidden_failure, input_columns, what_machine_switches, wiring_in_words
 from dzdesign.design.signal_text import command_signal, live_zero_signal, parse_signal, pressure_signal
-from dzdesign.design.signals import CommandSignal, PressureSignal, Signals
+from dzdesign.design.signals import CommandSignal, InputPair, PressureSignal, Signals
 from dzdesign.design.target_inputs import Converter
 from dzdesign.identify.valve.recorded_drop import DropColumns, RecordedDrop
 from tests.support.designs import BOTH_SIGNS, designed, options
@@ -21,6 +23,7 @@ from tests.support.repeatable_valves import identify
 from tests.support.synthetic import Truth, synthetic_ramp
 
 ADC = Converter()
+PAIRS = get_args(InputPair)
 
 
 def command(text: str, **options) -> CommandSignal:
@@ -69,25 +72,32 @@ def test_a_code_stands_for_every_pressure_that_makes_it(text):
         assert found.error_MPa[0] <= share * found.span_MPa - taken <= found.error_MPa[1]
 
 
-@pytest.mark.parametrize("swapped", [False, True])
-@pytest.mark.parametrize("sign", [1, -1])
-def test_a_difference_of_unlike_sensors_stands_for_every_drop_that_makes_it(sign, swapped):
-    texts = ("4..20 mA on 149 ohm = 25 MPa", "0.5..4.5 V x 0.6 = 160 bar")
-    parsed = [parse_signal(text, "--pressure-a") for text in texts]
-    a, b = (pressure_signal(one, ADC, Fraction(20)) for one in parsed)
+@pytest.mark.parametrize("pair", PAIRS)
+def test_a_difference_of_unlike_sensors_stands_for_every_drop_that_makes_it(pair):
+    texts = {"A": "4..20 mA on 149 ohm = 25 MPa", "B": "0.5..4.5 V x 0.6 = 160 bar", "C": "0.3..2.7 V = 10 MPa"}
+    parsed = {name: parse_signal(text, "--pressure-a") for name, text in texts.items()}
+    sensors = {name: pressure_signal(one, ADC, Fraction(20)) for name, one in parsed.items()}
+    third = {"pressure_c": sensors["C"]} if "C" in pair else {}
     both = command("-10..10 V x 0.15 + 1.5 V")
-    signals = Signals(command=both, pressure_a=a, pressure_b=b, swapped=swapped)
-    low, high = signals.difference_error(sign)
-    draw = random.Random(5)
+    signals = Signals(command=both, pressure_a=sensors["A"], pressure_b=sensors["B"], negative_pair=pair, **third)
+    assert signals.pair(1).names == "AB"
+    found, draw = signals.pair(-1), random.Random(5)
+    low, high = found.difference_error(signals.code_max)
+    ahead, behind = (parsed[name] for name in pair)
     for _ in range(3000):
         shares = [Fraction(draw.randrange(10**9), 10**9) for _ in range(2)]
-        codes = [ADC.code(one.volts(one.low + s * (one.high - one.low))) for one, s in zip(parsed, shares, strict=True)]
-        drop = shares[0] * a.span_MPa - shares[1] * b.span_MPa
-        if sign < 0 and swapped:
-            drop = -drop
-        counted = signals.difference(*codes, sign)
-        assert low <= drop / a.per_code_MPa - counted <= high
-        assert counted <= signals.largest_difference(sign)
+        values = zip((ahead, behind), shares, strict=True)
+        codes = [ADC.code(one.volts(one.low + share * (one.high - one.low))) for one, share in values]
+        drop = shares[0] * sensors[pair[0]].span_MPa - shares[1] * sensors[pair[1]].span_MPa
+        counted = found.difference(*codes)
+        assert low <= drop / sensors[pair[0]].per_code_MPa - counted <= high
+        assert counted <= found.largest_difference
+
+
+@pytest.mark.parametrize(("pair", "third"), [("AC", None), ("AB", PressureSignal()), ("BA", PressureSignal())])
+def test_a_third_sensor_is_there_where_the_negative_side_reads_it_and_nowhere_else(pair, third):
+    with pytest.raises(RuleError, match="expected a pressure_c where C is one of them"):
+        Signals(command=command("-10..10 V x 0.15 + 1.5 V"), negative_pair=pair, pressure_c=third)
 
 
 @pytest.mark.parametrize(
@@ -147,7 +157,7 @@ def test_the_default_signals_take_neither_end_of_the_converter_for_a_pressure():
         for each in (made.pressure_a, made.pressure_b):
             assert 0 < each.valid_codes[0] < each.zero_code
             assert each.full_code < each.valid_codes[1] < made.code_max
-        assert all(made.hidden_failures(1, reads_high=high) == () for high in (True, False))
+        assert all(made.pair(1).hidden_failures(made.code_max, reads_high=high) == () for high in (True, False))
     assert options().signals == Signals()
 
 
@@ -174,51 +184,91 @@ def designed_as(valve, positive, negative, choice="", **texts):
     return designed(replace(valve, sides=sides), **given)
 
 
+#: Recorded drops of three ports: of each side's edge, and the inputs ahead and behind at negative commands.
+THREE_PORTS = [
+    (drop("pP", "pA"), drop("pP", "pB"), "AC"),
+    (drop("pB", "pT"), drop("pA", "pT"), "CB"),
+    (drop("pP", "pA"), drop("pA", "pT"), "BC"),
+    (drop("pB", "pT"), drop("pP", "pB"), "CA"),
+]
+
+
 @pytest.mark.parametrize(
-    ("positive", "negative", "choice", "swapped"),
+    ("positive", "negative", "choice", "pair"),
     [
-        (drop(*AB), drop(*AB), "", False),
-        (drop(*AB), drop(*AB, sign=-1), "", True),
-        (drop(*AB), drop(*AB, sign=-1), "swapped", True),
-        (drop(*DP), drop(*DP, sign=-1), "", True),
+        (drop(*AB), drop(*AB), "", "AB"),
+        (drop(*AB), drop(*AB, sign=-1), "", "BA"),
+        (drop(*AB), drop(*AB, sign=-1), "B-A", "BA"),
+        (drop(*DP), drop(*DP, sign=-1), "", "BA"),
         # A dP above zero on both sides may be a magnitude, and a declared one has no sign at all.
-        (drop(*DP), drop(*DP), "", False),
-        (drop(*DP), drop(*DP), "swapped", True),
-        (None, None, "", False),
-        (None, None, "swapped", True),
-        (drop("pP", "pA"), drop("pP", "pB"), "wired", False),
-        (drop(*AB), drop(*AB, sign=-1), "wired", False),
+        (drop(*DP), drop(*DP), "", "AB"),
+        (drop(*DP), drop(*DP), "B-A", "BA"),
+        (drop(*DP), drop(*DP), "A-C", "AC"),
+        (None, None, "", "AB"),
+        (None, None, "C-B", "CB"),
+        (drop("pP", "pA"), drop("pP", "pB"), "wired", "AB"),
+        (drop("pP", "pA"), drop("pP", "pB"), "A-C", "AC"),
+        (drop(*AB), drop(*AB, sign=-1), "wired", "AB"),
+        *((positive, negative, "", pair) for positive, negative, pair in THREE_PORTS),
     ],
 )
-def test_the_direction_is_the_recorded_one_unless_it_is_declared(two_sides, positive, negative, choice, swapped):
-    assert designed_as(two_sides, positive, negative, choice).signals.swapped is swapped
+def test_the_inputs_are_the_recorded_ones_unless_they_are_declared(two_sides, positive, negative, choice, pair):
+    signals = designed_as(two_sides, positive, negative, choice).signals
+    assert signals.negative_pair == pair and (signals.pressure_c is not None) == ("C" in pair)
+
+
+@pytest.mark.parametrize(("positive", "negative", "pair"), THREE_PORTS)
+def test_the_inputs_are_named_after_what_was_recorded(two_sides, positive, negative, pair):
+    made = designed_as(two_sides, positive, negative)
+    columns = input_columns(made)
+    for each, names in ((positive, "AB"), (negative, pair)):
+        assert [columns[name] for name in names] == [AHEAD_LABELS[port] for port in each.columns[0].quantities]
+    assert not what_machine_switches(made)
 
 
 @pytest.mark.parametrize(
-    ("negative", "choice"), [(drop(*AB, sign=-1), "same"), (drop(*AB), "swapped")], ids=["same", "swapped"]
-)
-def test_a_declared_direction_that_the_recordings_contradict_is_refused(two_sides, negative, choice, wording):
-    kept = f"negative drop: a declared direction that the recordings contradict is refused [{choice}]"
-    with wording.refusal(InputError, kept):
-        designed_as(two_sides, drop(*AB), negative, choice)
-
-
-@pytest.mark.parametrize("choice", ["", "same", "swapped"])
-@pytest.mark.parametrize(
-    ("positive", "negative"),
+    ("positive", "negative", "choice"),
     [
-        (drop("pP", "pA"), drop("pP", "pB")),
-        (drop("pB", "pT"), drop("pA", "pT")),
-        (drop("pP", "pA"), drop("pA", "pT")),
-        (drop("pB", "pT"), drop("pP", "pB")),
+        (drop(*AB), drop(*AB, sign=-1), "A-B"),
+        (drop(*AB), drop(*AB), "B-A"),
+        (drop("pP", "pA"), drop("pP", "pB"), "A-B"),
+        (drop("pP", "pA"), drop("pP", "pB"), "C-A"),
     ],
+    ids=["B-A as A-B", "A-B as B-A", "A-C as A-B", "A-C as C-A"],
 )
-def test_drops_that_no_two_inputs_give_are_refused(two_sides, positive, negative, choice, wording):
-    with pytest.raises(InputError) as refused:
+def test_declared_inputs_that_the_recordings_contradict_are_refused(
+    two_sides, positive, negative, choice, wording, request
+):
+    with wording.refusal(InputError, f"negative drop: contradicted [{request.node.callspec.id}]"):
         designed_as(two_sides, positive, negative, choice)
-    if positive.columns[0].quantities[0] == negative.columns[0].quantities[0] == "pP":
-        wording("negative drop: three sensors", str(refused.value))
-    assert "--negative-dp wired" in str(refused.value)
+
+
+def test_a_side_whose_recordings_hold_the_drop_of_several_edges_has_no_two_inputs(two_sides, wording):
+    columns = (*drop("pP", "pB").columns, *drop("pA", "pT").columns)
+    several = RecordedDrop(columns=columns, sign=1)
+    with wording.refusal(InputError, "negative drop: several edges"):
+        designed_as(two_sides, drop("pP", "pA"), several)
+    assert designed_as(two_sides, drop("pP", "pA"), several, "wired").signals.negative_pair == "AB"
+
+
+def test_a_third_sensor_has_a_signal_and_an_error_of_its_own(two_sides):
+    machine = {"amplifier": "1 %", "pressure_error": "0.1 MPa / 0.2 MPa / 0.3 MPa"}
+    own = {"pressure_c": "4..20 mA on 140 ohm = 10 MPa", **machine}
+    made = designed_as(two_sides, drop("pP", "pA"), drop("pP", "pB"), **own)
+    assert made.signals.pressure_c.span_MPa == 10 and made.signals.pressure_a.span_MPa == 20
+    sensors = [{name for name in made.allowance(sign).pressures_MPa if "sensor" in name} for sign in (1, -1)]
+    assert sensors == [{"pressure sensor A", "pressure sensor B"}, {"pressure sensor A", "pressure sensor C"}]
+    assert made.allowance(-1).pressures_MPa["pressure sensor C"] == Fraction(3, 10)
+    for signal in (BOTH_SIGNS, "0..10 V x 0.3"):
+        two = designed_as(two_sides, drop(*AB), drop(*AB), amplifier="1 %", command_signal=signal)
+        assert two.machine.pressure_error_c_MPa is None and not [name for name in two.machine.defaults if "_c_" in name]
+
+
+@pytest.mark.parametrize("signal", [BOTH_SIGNS, "0..10 V x 0.3"])
+@pytest.mark.parametrize("given", [{"pressure_c": "4..20 mA on 140 ohm"}, {"pressure_error": "0.1 % / 0.1 % / 0.2 %"}])
+def test_what_is_said_of_a_third_sensor_that_nothing_reads_is_refused(two_sides, signal, given, wording):
+    with wording.refusal(InputError, "negative drop: a third sensor that nothing reads"):
+        designed_as(two_sides, drop(*AB), drop(*AB), command_signal=signal, **given)
 
 
 def test_one_side_alone_needs_no_direction(two_sides):
@@ -233,12 +283,14 @@ def test_one_side_alone_needs_no_direction(two_sides):
         (drop(*AB), drop(*AB, sign=-1), ""),
         (drop(*DP), drop(*DP), ""),
         (drop("pP", "pA"), drop("pP", "pB"), "wired"),
+        (drop("pP", "pA"), drop("pP", "pB"), ""),
     ],
-    ids=["recorded", "assumed", "wired"],
+    ids=["recorded", "assumed", "wired", "three"],
 )
 def test_what_the_direction_rests_on_is_said(two_sides, positive, negative, choice, wording, request):
     made = designed_as(two_sides, positive, negative, choice)
-    wording(f"negative drop: {request.node.callspec.id}", "\n".join(wiring_in_words(made)))
+    said = [*wiring_in_words(made), *filter(None, [what_machine_switches(made)])]
+    wording(f"negative drop: {request.node.callspec.id}", "\n".join(said))
 
 
 # ---- a failed sensor: refused, or accepted with what it costs
@@ -284,7 +336,7 @@ def test_a_signal_that_hides_what_raises_the_offset_is_refused(valve, texts, fal
     assert hidden.failures == expected
     assert compensator.costs[-1] and any(line.startswith("accepted, broken-sensor: ") for line in compensator.costs)
     # The flow, from the recorded points alone: the largest offset of any code, over the closing branch of each test.
-    codes = range(compensator.signals.largest_difference(1) + 1)
+    codes = range(compensator.signals.pair(1).largest_difference + 1)
     largest_V = max(compensator.compare(0, code) for code in codes) / 6000
     flows = {
         test.dp_MPa: float(np.interp(largest_V, test.recorded.falling.u_V, test.recorded.falling.q_L_min))
@@ -295,17 +347,18 @@ def test_a_signal_that_hides_what_raises_the_offset_is_refused(valve, texts, fal
     assert flows[hidden.dp_MPa] == max(flows.values()) > 0.5
 
 
-@pytest.mark.parametrize("swapped", [False, True])
-def test_the_negative_sides_sensor_ahead_is_the_other_one_where_the_pressures_are_swapped(valve, swapped):
+@pytest.mark.parametrize("pair", ["AB", "BA", "AC"])
+def test_what_is_hidden_at_negative_commands_is_of_the_inputs_of_that_side(valve, pair):
     two = replace(valve, sides={"positive": valve.positive, "negative": valve.positive})
     compensator = designed(
         two, pressure_a=BOTH, pressure_b=WHOLE, command_signal=BOTH_SIGNS, accept="broken-sensor",
-        negative_dp="swapped" if swapped else "same",
+        negative_dp="-".join(pair),
     )  # fmt: skip
     found = [hidden_failure(compensator, sign) for sign in (1, -1)]
     broken, above = "a broken wire of sensor B", "a reading of sensor B above its span"
     expected = {
-        ("decreasing", False): [None, None], ("decreasing", True): [None, (broken,)],
-        ("increasing", False): [(broken,), (broken,)], ("increasing", True): [(broken,), (above,)],
-    }.get((valve.positive.trend, swapped), [None, None])  # fmt: skip
+        ("decreasing", "AB"): [None, None], ("decreasing", "BA"): [None, (broken,)],
+        ("increasing", "AB"): [(broken,), (broken,)], ("increasing", "BA"): [(broken,), (above,)],
+        ("increasing", "AC"): [(broken,), None],
+    }.get((valve.positive.trend, pair), [None, None])  # fmt: skip
     assert [each and each.failures for each in found] == expected

@@ -11,18 +11,24 @@ struct claims {
     uint32_t calls, wrong, above_limit, falls, wraps;
 };
 
+#define SHAPE(bit) ((DZ_CALIBRATION_SHAPE & (bit)) != 0u)
+/* Which sensor is ahead and which behind: 0 for A. */
+#define AHEAD(which) ((which) == 0 ? 0 : SHAPE(4u) ? 1 : SHAPE(8u) ? 2 : 0)
+#define BEHIND(which) ((which) == 0 ? 1 : SHAPE(16u) ? 0 : SHAPE(32u) ? 2 : 1)
+
 static int32_t turned(int32_t value, int turn)
 {
     return turn < 0 ? -value : value;
 }
 
 /* The law from the block's numbers alone: branches and signed numbers of any size. */
-static uint32_t exact(const struct dz_calibration *c, int which, int rises, int turn, int32_t u, int32_t a, int32_t b,
+static uint32_t exact(const struct dz_calibration *c, int which, int rises, int32_t u, int32_t a, int32_t b,
                       struct claims *claims)
 {
     const struct dz_calibration_side *s = &c->sides[which];
-    const int64_t drop = (int64_t)turn * (((int64_t)(a - c->a_zero) << 12) - (int64_t)(b - c->b_zero) * c->weight_b);
-    const int failed = a < c->a_low || a > c->a_high || b < c->b_low || b > c->b_high || drop < -(int64_t)c->reverse;
+    const struct dz_calibration_sensor *p = &c->sensors[AHEAD(which)], *q = &c->sensors[BEHIND(which)];
+    const int64_t drop = ((int64_t)(a - p->zero) << 12) - (int64_t)(b - q->zero) * s->weight;
+    const int failed = a < p->low || a > p->high || b < q->low || b > q->high || drop < -(int64_t)c->reverse;
     const int64_t dp = drop > 0 ? drop >> 12 : 0;
     const int64_t node = failed ? DZ_CALIBRATION_NODE_MASK : dp / DZ_BETA_STEP, past = failed ? 0 : dp % DZ_BETA_STEP;
     const wide left = DZ_BETA_STEP - past;
@@ -56,7 +62,7 @@ static int32_t draw(int32_t low, int32_t high)
 
 typedef uint16_t (*core)(const struct dz_calibration *, uint16_t, uint16_t, uint16_t);
 
-static void sweep(const struct dz_calibration *c, core comp, int which, int rises, int turn, int32_t a, int32_t b,
+static void sweep(const struct dz_calibration *c, core comp, int which, int rises, int32_t a, int32_t b,
                   struct claims *claims)
 {
     int32_t before = rises ? 0 : 65535;
@@ -67,7 +73,7 @@ static void sweep(const struct dz_calibration *c, core comp, int which, int rise
         const int valid = u >= c->command_low && u <= c->command_high;
 
         claims->calls++;
-        claims->wrong += found != exact(c, which, rises, turn, u, a, b, claims);
+        claims->wrong += found != exact(c, which, rises, u, a, b, claims);
         claims->above_limit += found > c->compare_limit || found > DZ_COMPARE_MAX;
         if (valid) {
             claims->falls += !first && (rises ? (int32_t)found < before : (int32_t)found > before);
@@ -77,8 +83,15 @@ static void sweep(const struct dz_calibration *c, core comp, int which, int rise
     }
 }
 
-#define FALLING ((DZ_CALIBRATION_SHAPE & 2u) != 0u)
-#define SWAPPED ((DZ_CALIBRATION_SHAPE & 4u) != 0u)
+#define FALLING SHAPE(2u)
+
+#ifdef BIPOLAR
+#define SIDES 2
+static const core laws[SIDES] = {dz_comp, dz_comp_negative};
+#else
+#define SIDES 1
+static const core laws[SIDES] = {dz_comp};
+#endif
 
 /* Tries `count` blocks, whatever the check says of them; the claims of each in its place. */
 void try_blocks(const struct dz_calibration *blocks, uint32_t count, uint32_t pairs, uint32_t seed,
@@ -90,13 +103,14 @@ void try_blocks(const struct dz_calibration *blocks, uint32_t count, uint32_t pa
 
         for (uint32_t pair = 0; pair < pairs; pair++) {
             const int anything = pair % 4 == 3;
-            const int32_t a = anything ? draw(0, 65535) : pair == 0 ? c->a_high : draw(c->a_low, c->a_high);
-            const int32_t b = anything ? draw(0, 4095) : pair == 0 ? c->b_low : draw(c->b_low, c->b_high);
 
-            sweep(c, dz_comp, 0, !FALLING, 1, a, b, &claims[index]);
-#ifdef BIPOLAR
-            sweep(c, dz_comp_negative, 1, FALLING, SWAPPED ? -1 : 1, a, b, &claims[index]);
-#endif
+            for (int which = 0; which < SIDES; which++) {
+                const struct dz_calibration_sensor *p = &c->sensors[AHEAD(which)], *q = &c->sensors[BEHIND(which)];
+                const int32_t a = anything ? draw(0, 65535) : pair == 0 ? p->high : draw(p->low, p->high);
+                const int32_t b = anything ? draw(0, 4095) : pair == 0 ? q->low : draw(q->low, q->high);
+
+                sweep(c, laws[which], which, which == 0 ? !FALLING : FALLING, a, b, &claims[index]);
+            }
         }
     }
 }

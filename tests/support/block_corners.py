@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from dzdesign.codegen.calibration.acceptance import LARGEST_CODES, LARGEST_DROP
-from dzdesign.codegen.calibration.layout import NODE_MASK, SUPPLY_MASK
+from dzdesign.codegen.calibration.layout import NODE_MASK, SUPPLY_MASK, BuiltFor
 from dzdesign.design.current.circuit import LARGEST_ERROR
 from dzdesign.design.drive_functions import MOST_FAULT_SAMPLES
 from dzdesign.design.signals import WEIGHT_SHIFT
@@ -14,21 +14,27 @@ INT32 = 2**31 - 1
 def corners(block, built):
     """Blocks at a limit that one changed number alone does not reach: where two numbers hang together."""
     for weight in (0, 1):
-        yield rebalanced(replace(block, weight_b=weight))
+        yield rebalanced(with_sides(block, {"weight": weight}))
     yield from law_corners(block, built)
     yield from play_corners(block, built)
     for steps in ({"ramp_up": 0}, {"ramp_down": 0}, {"ramp_up": 1, "ramp_down": 2**31 - 1}, {"ramp_up": 2**31}):
         yield replace(with_sides(block, steps), ramps=1)
-    for name in ("command", "a", "b"):
-        low, zero, high = (getattr(block, f"{name}_{end}") for end in ("low", "zero", "high"))
+    ends = ("low", "zero", "high")
+    sensors = {place: block.sensors[place] for place in range(len(built.inputs))}
+    for place, sensor in {None: None, **sensors}.items():
+        low, zero, high = (getattr(sensor or block, end if sensor else f"command_{end}") for end in ends)
         above, top = min(high + 1, 65535), built.code_max
         for codes in ((low, low, low), (high, high, high), (0, 0, 0), (low, above, high), (zero, low, high),
                       (0, 0, 1), (0, 1, 1), (high - 1, high - 1, high), (high - 1, high, high),
                       (low, zero, min(top + 1, 65535)), (low, zero, top)):  # fmt: skip
-            made = dict(zip((f"{name}_{end}" for end in ("low", "zero", "high")), codes, strict=True))
-            yield rebalanced(replace(block, **made))
+            made = dict(zip(ends, codes, strict=True))
+            if sensor:
+                yield rebalanced(with_sensors(block, {place: made}))
+            else:
+                yield replace(block, **{f"command_{end}": code for end, code in made.items()})
     yield from (drops(block, LARGEST_DROP + over, turned) for over in (0, 1) for turned in (False, True))
-    yield rebalanced(replace(block, b_low=0, b_zero=0, b_high=1, weight_b=65535))
+    narrow = with_sensors(block, {1: {"low": 0, "zero": 0, "high": 1}})
+    yield rebalanced(with_sides(narrow, {"weight": 65535}))
     yield from (replace(block, fault_samples=samples) for samples in (MOST_FAULT_SAMPLES, MOST_FAULT_SAMPLES + 1))
     yield from spans(block)
     yield replace(block, leave_zero=block.zero_band)
@@ -72,8 +78,11 @@ def drops(block, drop: int, turned: bool):
         for b in range(max(rest // 65535, 1), 3000):
             if 0 < rest <= b * 65535 and rest % b == 0:
                 zero_a, zero_b = (500 + a, 500) if turned else (500, 500 + b)
-                codes = {"a_low": 500, "a_zero": zero_a, "a_high": 500 + a, "b_low": 500, "b_zero": zero_b}
-                return rebalanced(replace(block, **codes, b_high=500 + b, weight_b=rest // b))
+                codes = {
+                    0: {"low": 500, "zero": zero_a, "high": 500 + a},
+                    1: {"low": 500, "zero": zero_b, "high": 500 + b},
+                }
+                return rebalanced(with_sides(with_sensors(block, codes), {"weight": rest // b}))
     raise ValueError(f"no codes have the drop {drop}")
 
 
@@ -135,7 +144,7 @@ def factors(product: int):
 
 def law_corners(block, built):
     """Laws of one beta and nothing else: each number at its limit, and one beyond."""
-    count = block.sides[0].node_count
+    count = max(side.node_count for side in block.sides)
     nothing = {"slope": 0, "offset": 1, "transition": 0, "linear": 0, "half": 0, "beta_factor": 0, "beta_shift": 0,
                "quotient_limit": 0, "reciprocal": 1, "reciprocal_shift": 0}  # fmt: skip
 
@@ -216,6 +225,22 @@ def with_sides(block, change):
     return replace(block, sides=tuple(replace(side, **change) for side in block.sides))
 
 
+def with_sensors(block, changes):
+    """The block with some of its sensors changed, by their places."""
+    sensors = enumerate(block.sensors)
+    return replace(block, sensors=tuple(replace(sensor, **changes.get(place, {})) for place, sensor in sensors))
+
+
+def sensors_of(block, sign):
+    """The sensors ahead and behind, for one sign of command."""
+    built = BuiltFor(shape=block.shape, code_max=0, compare_max=0, sample_Hz=0, tick_Hz=0, beta_step=0, samples=0)
+    return tuple(block.sensors["ABC".index(name)] for name in built.pair(sign))
+
+
 def rebalanced(block):
-    """The block with what its difference is without pressures."""
-    return replace(block, balance=((block.a_zero << 12) - block.b_zero * block.weight_b) % 2**32)
+    """The block with what the differences of its sides are without pressures."""
+    sides = []
+    for sign, side in zip((1, -1), block.sides, strict=True):
+        ahead, behind = sensors_of(block, sign)
+        sides.append(replace(side, balance=((ahead.zero << 12) - behind.zero * side.weight) % 2**32))
+    return replace(block, sides=tuple(sides))

@@ -8,7 +8,7 @@ MEMBERS = {
     "magic": (0, "4s"), "layout": (2, "<H"), "length": (3, "<H"), "shape": (4, "<H"), "code_max": (5, "<H"),
     "compare_max": (6, "<H"), "sample_Hz": (7, "<H"), "tick_Hz": (8, "<H"), "sha256": (10, "32s"),
     "serial": (26, "24s"), "record": (38, "48s"), "u_max_uV": (62, "<I"), "a_span_Pa": (64, "<I"),
-    "a_full": (68, "<H"), "command_zero": (76, "<H"),
+    "a_full": (66, "<H"), "command_zero": (84, "<H"),
 }  # fmt: skip
 
 

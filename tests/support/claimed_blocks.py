@@ -9,6 +9,7 @@ from dzdesign.codegen.calibration.acceptance import LARGEST_DROP, largest_node, 
 from dzdesign.codegen.calibration.files import block_core_files
 from dzdesign.codegen.calibration.layout import NODE_MASK, PLAY_NODES
 from dzdesign.codegen.calibration.packing import pack
+from tests.support.block_corners import rebalanced, sensors_of, with_sensors, with_sides
 from tests.support.c_library import load_library
 from tests.support.core_texts import texts
 from tests.support.paths import TESTS
@@ -47,9 +48,12 @@ def random_block(block, built, drawn):
     low, high = drawn.codes(2, built.code_max - 2)
     high += 2
     zero = drawn.between(low + 1, high - 1)
-    a_low, a_zero, a_high = drawn.codes(3, built.code_max)
-    b_low, b_zero, b_high = drawn.codes(3, built.code_max)
-    weight = drawn.between(1, min(65535, LARGEST_DROP // max(b_high - b_low, 1) // 2))
+    codes_of = [drawn.codes(3, built.code_max) for _ in built.inputs]
+    sensors = {
+        place: {"low": a, "zero": b, "high": c + (c == a)} for place, (a, b, c) in enumerate(codes_of)
+    }  # fmt: skip
+    longest = max(each["high"] - each["low"] for each in sensors.values())
+    weight = drawn.between(1, min(65535, LARGEST_DROP // longest // 2))
     rises = not built.has("FALLING")
     valid = [high - zero if rises else zero - low, zero - low if rises else high - zero]
     spans = [drawn.between(1, each) for each in valid]
@@ -57,17 +61,16 @@ def random_block(block, built, drawn):
     codes = drawn.between(1, min(used))
     band = drawn.between(0, min(used) - codes)
     signals = {
-        "command_low": low, "command_zero": zero, "command_high": high, "a_low": a_low, "a_zero": a_zero,
-        "a_high": a_high + (a_high == a_low), "b_low": b_low, "b_zero": b_zero, "b_high": b_high + (b_high == b_low),
-        "weight_b": weight, "balance": ((a_zero << 12) - b_zero * weight) % 2**32, "zero_band": band,
+        "command_low": low, "command_zero": zero, "command_high": high, "zero_band": band,
         "transition_codes": codes, "reverse": drawn.between(0, LARGEST_DROP),
         "compare_limit": drawn.between(0, built.compare_max),
     }  # fmt: skip
     made = replace(block, **signals, **random_drive(block, built, drawn, used, codes, band))
+    made = rebalanced(with_sides(with_sensors(made, sensors), {"weight": weight}))
     ways = (rises, not rises)
-    each = zip(block.sides, spans, ways, strict=True)
+    each = zip(made.sides, spans, ways, strict=True)
     sides = tuple(random_side(made, side, built, drawn, span, rising) for side, span, rising in each)
-    return replace(made, sides=sides if built.has("BIPOLAR") else (sides[0], block.sides[1]))
+    return replace(made, sides=sides if built.has("BIPOLAR") else (sides[0], made.sides[1]))
 
 
 def random_drive(block, built, drawn, spans, codes, band):
@@ -91,8 +94,8 @@ def random_drive(block, built, drawn, spans, codes, band):
 
 def random_side(block, side, built, drawn, span, rises):
     """A law whose sums come up to what 64 bits hold."""
-    drop = max(((block.a_high - block.a_zero) << 12) + (block.b_zero - block.b_low) * block.weight_b,
-               ((block.a_zero - block.a_low) << 12) + (block.b_high - block.b_zero) * block.weight_b)  # fmt: skip
+    pairs = [sensors_of(block, sign) for sign in (1, -1)]
+    drop = max(((ahead.high - ahead.zero) << 12) + (behind.zero - behind.low) * side.weight for ahead, behind in pairs)
     count = drawn.between(min(drop // (built.beta_step << 12) + 2, NODE_MASK), NODE_MASK)
     most = drawn.between(1, largest_node(built.beta_step)) + drawn.chance(0.03)
     law = [drawn.between(1, most) for _ in range(count)]

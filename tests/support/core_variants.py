@@ -56,8 +56,18 @@ VARIANTS = {
     "play": {"play": True},
     "bipolar, play": {"signals": {"command": BOTH}, "play": True, "ramp_up_s": (0.5, 0.8)},
     "bipolar, no transition": {"signals": {"command": BOTH}, "transition": Fraction(0), **DRIVE_FUNCTIONS},
-    "bipolar, all options": {"signals": UNLIKE | {"command": BOTH, "swapped": True}, "transition": Fraction(1, 100)}
-    | DRIVE_FUNCTIONS,
+    "bipolar, all options": {
+        "signals": UNLIKE | {"command": BOTH, "negative_pair": "BA"}, "transition": Fraction(1, 100)
+    } | DRIVE_FUNCTIONS,
+    "three pressures": {
+        "signals": UNLIKE
+        | {"command": BOTH, "negative_pair": "AC", "pressure_c": _sensor("4..20 mA on 140 ohm = 100 bar")},
+        "play": True, "ramp_up_s": (0.5, 0.8), "fault_latch": True,
+    },
+    "three pressures, others ahead": {
+        "signals": UNLIKE | {"command": BOTH, "negative_pair": "CB", "pressure_c": _sensor("0.5..2.5 V = 30 MPa")},
+        **DRIVE_FUNCTIONS,
+    },
 }  # fmt: skip
 NAMES = tuple(VARIANTS)
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from dzdesign.codegen.calibration.block import built_for, current_block, numbers_of
 from dzdesign.codegen.calibration.files import valve_files
+from dzdesign.codegen.calibration.layout import SHAPE_BITS
 from dzdesign.codegen.calibration.numbers import ValvePage
 from dzdesign.design.current.circuit import CurrentLoop, SupplyCorrection
 from tests.support.core_texts import texts
@@ -56,7 +57,19 @@ LARGEST = replace(
     offset_shift=0,
     rate=65535,
 )
-LOOPS = {"plain": PLAIN, "supply": replace(PLAIN, supply=SUPPLY, integral_limit=5000, release=1000), "largest": LARGEST}
+LOOPS = {
+    "plain": PLAIN,
+    "supply": replace(PLAIN, supply=SUPPLY, integral_limit=5000, release=1000),
+    "largest": LARGEST,
+    "two solenoids": replace(PLAIN, held_ticks=100),
+    "two shunts": replace(PLAIN, held_ticks=100, shunts=2, supply=SUPPLY, integral_limit=5000, release=1000),
+}
+
+
+def shape_of(loop: CurrentLoop) -> int:
+    """Return what a firmware with this controller is compiled for."""
+    holds = {"CURRENT": True, "SUPPLY": loop.supply, "BIPOLAR": loop.two, "SHUNTS": loop.shunts == 2}
+    return sum(bool(holds.get(name)) << place for place, name in enumerate(SHAPE_BITS))
 
 
 def current_texts(loop: CurrentLoop, banner: Sequence[str] = ()) -> dict[str, str]:
@@ -64,7 +77,7 @@ def current_texts(loop: CurrentLoop, banner: Sequence[str] = ()) -> dict[str, st
     compensator = variant("default")
     built = built_for(compensator, fixed=True)
     sizes = replace(built.sizes, supply_mask=63 if loop.supply else 0)
-    built = replace(built, shape=8 + 16 * bool(loop.supply), samples=loop.samples, sizes=sizes)
+    built = replace(built, shape=shape_of(loop), samples=loop.samples, sizes=sizes)
     numbers = replace(numbers_of(compensator), current=current_block(loop, sizes))
     made = texts(valve_files(ValvePage(compensator=compensator, block=numbers, built=built)), banner)
     # The stand-ins for dz_comp.h have these two of their own.

@@ -3,12 +3,17 @@
 from dataclasses import replace
 from functools import cache
 
+from dzdesign.codegen.project import target_named
 from dzdesign.codegen.target import Target
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.current.circuit import CoilCircuit, CurrentLoop, CurrentSampling, CurrentSensor
 from dzdesign.design.current.drive import choose_loop, design_current_drive
 from dzdesign.design.current.responses import CurrentRequest
+from dzdesign.design.designing import design
+from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import Converter
+from tests.support.core_variants import BOTH
+from tests.support.golden_firmware import FULL, full_options, golden_valve
 
 COIL = CoilCircuit(resistance_ohm=3.5, inductance_H=0.04, rated_A=1.0, supply_V=(18.0, 32.0))
 CONVERTER, SAMPLING = Converter(), CurrentSampling()
@@ -34,6 +39,19 @@ def with_current(compensator: Compensator, target: Target, sensor: CurrentSensor
     """Return a compensator that controls the current of this coil on a target."""
     request = replace(asked(sensor), sampling=target.current_sampling, converter=target.converter)
     return replace(compensator, current_drive=_drive(request, compensator.signals.compare_max))
+
+
+@cache
+def two_with_current(target_name: str, shunts: int) -> Compensator:
+    """Return a compensator of two solenoids with this coil, the supply measured."""
+    target = target_named(target_name)
+    signals = Signals(command=BOTH, compare_max=target.compare_max)
+    made = design(golden_valve(FULL), full_options(signals=signals, negative_dp="wired"))
+    request = replace(
+        asked(SENSORS["supply measured"]), converter=target.converter, sampling=target.current_sampling,
+        solenoids=2, shunts=shunts,
+    )  # fmt: skip
+    return replace(made, current_drive=_drive(request, signals.compare_max))
 
 
 _drive = cache(design_current_drive)

@@ -52,7 +52,7 @@ def full_options(**changes) -> DesignOptions:
         command=command_signal(parse_signal("-10..10 V x 0.15 + 1.5 V", "--command-signal"), adc),
         pressure_a=sensor("4..20 mA on 139 ohm = 25 MPa"),
         pressure_b=sensor("4..20 mA on 140 ohm = 16 MPa"),
-        swapped=True,
+        negative_pair="BA",
     )
     chosen = {
         "signals": signals,

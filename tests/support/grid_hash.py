@@ -33,7 +33,7 @@ def exact_line(compensator: Compensator, grid: tuple[str, int, int]) -> str:
                     sensor.valid_codes[0] <= code <= sensor.valid_codes[1]
                     for sensor, code in ((signals.pressure_a, p_a), (signals.pressure_b, p_b))
                 )
-                answer = compare(command, max(signals.difference(p_a, p_b), failed) if possible else failed)
+                answer = compare(command, max(signals.pair(1).difference(p_a, p_b), failed) if possible else failed)
                 if command > signals.code_max:
                     answer = 0
                 for byte in (answer & 0xFF, answer >> 8):

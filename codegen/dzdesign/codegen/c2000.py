@@ -18,7 +18,10 @@ ADC_BITS, CHANNELS = 12, 3
 #: Conversions of each sequence that are not used: TI reports a first code of FFFh, which would be full drive.
 DISCARDED = 1
 #: What the converter reads, and the channel of each where none is declared.
-ROLES = {"command": "A0", "pressure_a": "A1", "pressure_b": "A2", "current": "A3", "supply": "A4"}
+ROLES = {
+    "command": "A0", "pressure_a": "A1", "pressure_b": "A2", "pressure_c": "A6", "current": "A3", "current_b": "A5",
+    "supply": "A4",
+}  # fmt: skip
 #: With current control: as many codes in a period as there are results beside those of the sample. The interrupt comes
 #: so late that all but one of them are of this period, and its value acts from the next one on.
 CURRENT = CurrentSampling(tick_Hz=PWM_HZ, samples=8, before=7)
@@ -42,6 +45,7 @@ def c2000_target(
     converter: Converter,
     known_channels: Mapping[str, int],
     channels: Sequence[str] = (),
+    inputs: Sequence[str] = (),
     crystal_hz: int | None = None,
     sources: tuple[str, ...] = (),
     block_sources: tuple[str, ...] = (),
@@ -50,8 +54,8 @@ def c2000_target(
 ) -> Target:
     """Return the target whose figures, printed, are `context`.
 
-    `sources` is the C that only it has, `block_sources` what it has besides in block form. For `channels` and
-    `crystal_hz` see `Target.on_board`; `known_channels` has the number of each channel that is a pin.
+    `sources` is the C that only it has, `block_sources` what it has besides in block form. For `channels`, `inputs`
+    and `crystal_hz` see `Target.on_board`; `known_channels` has the number of each channel that is a pin.
     """
     own = (*OF_THE_DEVICE, *OF_BOTH[:3], *sources)
     templates = {file: f"{file}.jinja" for file in (*own, "README.md")}
@@ -73,7 +77,7 @@ def c2000_target(
         block_templates={f"{name}/{file}": f"{file}.jinja" for file in block_sources},
         # Where the user's C2000Ware lies, what is wired to the device, and what else it does.
         board=frozenset({f"{name}/dzdesign.projectspec", f"{name}/dz_board.h", USER_CODE}),
-        context={**context, **TOOLS, **listed, **_channels(name, known_channels, channels)},
+        context={**context, **TOOLS, **listed, **_channels(name, known_channels, channels, inputs)},
         crystal_Hz=crystal_hz,
         channels=tuple(channels),
         sector=sector,
@@ -81,14 +85,18 @@ def c2000_target(
     )
 
 
-def _channels(name: str, known: Mapping[str, int], declared: Sequence[str]) -> dict[str, str]:
+def _channels(
+    name: str, known: Mapping[str, int], declared: Sequence[str], inputs: Sequence[str]
+) -> dict[str, str]:
     """Return name and number of the channel of each role, printed; of those that are not declared one that is free."""
     for channel in declared:
         if channel not in known:
             hint = nearest(channel, known)
             raise InputError(f"--channels: {name} has no channel '{channel}'{hint}; it has {', '.join(known)}")
-    free = [channel for channel in (*ROLES.values(), *known) if channel not in declared]
-    of_roles = dict(zip(ROLES, (*declared, *(free if declared else ROLES.values())), strict=False))
+    of_roles = dict(zip(inputs or ROLES, declared, strict=False))
+    for role, usual in ROLES.items():
+        free = (channel for channel in (usual, *ROLES.values(), *known) if channel not in of_roles.values())
+        of_roles[role] = of_roles.get(role) or next(free)
     names = {f"{role}_channel": f"ADCIN{channel}" for role, channel in of_roles.items()}
     return names | {f"{role}_number": str(known[channel]) for role, channel in of_roles.items()}
 

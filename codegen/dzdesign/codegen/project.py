@@ -21,7 +21,7 @@ from dzdesign.codegen.calibration.files import (
 from dzdesign.codegen.calibration.layout import BuiltFor, CalibrationBlock
 from dzdesign.codegen.calibration.packing import OCTETS, pack
 from dzdesign.codegen.core.certificate_text import zero_command
-from dzdesign.codegen.core.constants import FAULT_BITS, Values
+from dzdesign.codegen.core.constants import Values, current_faults
 from dzdesign.codegen.loading.protocol import LOAD_FILES, STORE, load_context
 from dzdesign.codegen.target import Target, folder_of
 from dzdesign.codegen.vectors import vectors_text
@@ -82,9 +82,21 @@ def target_named(name: str) -> Target:
     return target
 
 
-def target_for(designed_for: TargetInputs) -> Target:
-    """Return the target that a compensator was designed for, on the board that was declared."""
-    return target_named(designed_for.name).on_board(designed_for.crystal_Hz, designed_for.channels)
+def target_for(designed_for: TargetInputs, inputs: Sequence[str] = ()) -> Target:
+    """Return the target that a compensator with these inputs was designed for, on the board that was declared."""
+    return target_named(designed_for.name).on_board(designed_for.crystal_Hz, designed_for.channels, inputs)
+
+
+def inputs_of(compensator: Compensator) -> tuple[str, ...]:
+    """Return what a compensator reads, as `c2000.ROLES` names it, in the order of its declared channels."""
+    drive = compensator.current_drive
+    pressures = (f"pressure_{name.lower()}" for name in compensator.signals.pressures)
+    return (
+        "command",
+        *pressures,
+        *(["current", "current_b"][: drive.loop.shunts] if drive else []),
+        *(["supply"] if drive and drive.loop.supply else []),
+    )
 
 
 def targets() -> tuple[Target, ...]:
@@ -120,7 +132,7 @@ def generate(
     designed_for = compensator.target
     target = target_named(target_name or (designed_for.name if designed_for else DEFAULT_TARGET))
     if designed_for:
-        of_design = target_for(designed_for)
+        of_design = target_for(designed_for, inputs_of(compensator))
         of_design.check_designed_for(designed_for)
         target = of_design if of_design.name == target.name else target
     target.check_signals(compensator.signals)
@@ -191,6 +203,9 @@ def target_files(
         full_V = compensator.target.converter.full_V
     values = {
         "bipolar": len(signals.signs) == 2,
+        "three": signals.pressure_c is not None,
+        # Of the negative side's functions: what their codes end with, ahead and behind.
+        "negative_pair": signals.negative_pair.lower(),
         "signals": signals,
         "units": compensator.valve.recorded_units.of_controller,
         "u_max_V": float(compensator.u_max_V),
@@ -204,7 +219,7 @@ def target_files(
         "loads": block is not None and target.link is not None,
         "link_sources": link_names(target, ".c") if block else (),
         "link_headers": link_names(target, ".h") if block else (),
-        "current_faults": FAULT_BITS,
+        "current_faults": current_faults(two=len(signals.signs) == 2),
         "wiring": wiring_of(compensator, Converter(full_V=full_V, levels=levels)),
         "firmware_origin": f"0x{banner.digest[:4].upper()}",
         "lot_setting": banner.lot,

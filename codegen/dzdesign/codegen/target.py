@@ -75,7 +75,7 @@ class Target:
     crystal_Hz: int | None = None
     channels: tuple[str, ...] = ()
     #: What makes this target on a declared board; None where a board has nothing that these files would know.
-    of_board: Callable[[int | None, Sequence[str]], "Target"] | None = None
+    of_board: Callable[[int | None, Sequence[str], Sequence[str]], "Target"] | None = None
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", self.name):
@@ -110,8 +110,10 @@ class Target:
         """Where a calibration block lies; address 0, in octets, where it has no sector of its own."""
         return self.sector.place if self.sector else Place()
 
-    def on_board(self, crystal_Hz: int | None, channels: Sequence[str]) -> "Target":
+    def on_board(self, crystal_Hz: int | None, channels: Sequence[str], inputs: Sequence[str] = ()) -> "Target":
         """Return the target on a board with this crystal and these channels; without any the target as it is.
+
+        The channels are those of `inputs`, one by one: of a design's, or as long as it is not made of all that may be.
 
         Raises
         ------
@@ -124,7 +126,7 @@ class Target:
             given = "--crystal" if crystal_Hz else "--channels"
             raise InputError(f"{given} is of a board of TI's C2000, and target {self.name} has none; leave it out")
         try:
-            return replace(self.of_board(crystal_Hz, channels), of_board=self.of_board)
+            return replace(self.of_board(crystal_Hz, channels, inputs), of_board=self.of_board)
         except InputError:
             raise
         except DzdesignError as error:

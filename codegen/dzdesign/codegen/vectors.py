@@ -10,29 +10,30 @@ from math import floor
 from random import Random
 from typing import NamedTuple
 
-from dzdesign.codegen.core.constants import STATUS_BITS
+from dzdesign.codegen.core.constants import STATUS_BITS, THIRD_BIT
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.signals import CODE_LIMIT, WEIGHT_UNIT, CommandSignal, PressureSignal, Signals
 
 #: Of every random choice; the same compensator gives the same vectors.
 SEED = 1
-INPUTS = ("u_adc", "p_a_adc", "p_b_adc")
+INPUTS = ("u_adc", "ahead_adc", "behind_adc")
 #: Of each sign of command: what `dz_comp()`, `dz_status()` and `dz_beta()` return.
 ANSWERS = {
     1: ("compare_counts", "status_bits", "beta_x_32768"),
     -1: ("compare_negative_counts", "status_negative_bits", "beta_negative_x_32768"),
 }
 BETA_UNIT = 2**15
-COMMAND, PRESSURE_A, PRESSURE_B, DIFFERENCE, ABOVE = (1 << place for place in range(len(STATUS_BITS)))
+STATUS = {name: 1 << place for place, name in enumerate(STATUS_BITS)}
+STATUS |= {name: 1 << place for name, (place, _) in THIRD_BIT.items()}
 
 
 class Codes(NamedTuple):
-    """The inputs of one call of the core."""
+    """The inputs of one call of the core: the pressures are those ahead and behind, for either sign of command."""
 
     u_adc: int
-    p_a_adc: int
-    p_b_adc: int
+    ahead_adc: int
+    behind_adc: int
 
 
 def vectors_text(compensator: Compensator, count: int) -> str:
@@ -51,14 +52,15 @@ def vectors_text(compensator: Compensator, count: int) -> str:
 
 def answers(compensator: Compensator, codes: Codes, sign: int) -> tuple[int, int, int]:
     """Return what the core of one sign must answer: compare value, bits of status, beta over 2^15 rounded down."""
-    signals, u = compensator.signals, codes.u_adc
-    ranges = (signal.valid_codes for signal in (signals.command, signals.pressure_a, signals.pressure_b))
-    valid_u, valid_a, valid_b = (low <= code <= high for code, (low, high) in zip(codes, ranges, strict=True))
-    difference, too_low = signals.difference(codes.p_a_adc, codes.p_b_adc, sign), -compensator.reverse_codes - 1
-    status = (not valid_u) * COMMAND + (not valid_a) * PRESSURE_A + (not valid_b) * PRESSURE_B
-    if valid_a and valid_b:
-        tested_to = signals.dp_code(compensator.side(sign).certificate.dp_MPa[1])
-        status += (difference <= too_low) * DIFFERENCE + (difference > tested_to) * ABOVE
+    pair, u = compensator.signals.pair(sign), codes.u_adc
+    ranges = (signal.valid_codes for signal in (compensator.signals.command, pair.ahead, pair.behind))
+    valid_u, *valid = (low <= code <= high for code, (low, high) in zip(codes, ranges, strict=True))
+    difference, too_low = pair.difference(codes.ahead_adc, codes.behind_adc), -compensator.reverse_codes - 1
+    status = (not valid_u) * STATUS["COMMAND"]
+    status += sum(STATUS[f"PRESSURE_{name}"] for name, sound in zip(pair.names, valid, strict=True) if not sound)
+    if all(valid):
+        tested_to = pair.dp_code(compensator.side(sign).certificate.dp_MPa[1])
+        status += (difference <= too_low) * STATUS["DIFFERENCE"] + (difference > tested_to) * STATUS["ABOVE"]
     else:
         difference = too_low  # a failed sensor, and the smallest beta as for it
     compare = compensator.compare(u, difference, sign) if valid_u else 0
@@ -115,14 +117,15 @@ class _Side:
     def __init__(self, compensator: Compensator, sign: int) -> None:
         self._compensator, self._sign = compensator, sign
         self._signals = signals = compensator.signals
-        self._command, self._weight_b = signals.command, signals.weight_b
-        self._a, self._b = signals.pressure_a, signals.pressure_b
-        self._turn = -1 if sign < 0 and signals.swapped else 1
-        # A pressure drop d and code b need code a = slant of b + turn * d; the slant never falls.
-        self._slant = [_slant(signals, b, sign) for b in range(self._b.valid_codes[0], self._b.valid_codes[1] + 1)]
-        self._tested_to = floor(signals.dp_code(compensator.side(sign).certificate.dp_MPa[1]))
+        self._command, self._pair = signals.command, signals.pair(sign)
+        self._a, self._b = self._pair.ahead, self._pair.behind
+        # A pressure drop d and code b behind need code a = slant of b + d ahead; the slant never falls.
+        zero = self._a.zero_code
+        behind = range(self._b.valid_codes[0], self._b.valid_codes[1] + 1)
+        self._slant = [zero - self._pair.difference(zero, b) for b in behind]
+        self._tested_to = floor(self._pair.dp_code(compensator.side(sign).certificate.dp_MPa[1]))
         #: Pressure drops from none on that sound pressures make.
-        self.drops = [drop for drop in range(signals.largest_difference(sign) + 1) if self._codes_of_b(drop)]
+        self.drops = [drop for drop in range(self._pair.largest_difference + 1) if self._codes_of_b(drop)]
         self._three = [drop for drop in dict.fromkeys((0, self._tested_to, self.drops[-1])) if self._codes_of_b(drop)]
         self._middle = (compensator.transition_end + self._command.span(sign)) // 2
 
@@ -163,7 +166,7 @@ class _Side:
                 yield Codes(self._code(away), *end(pairs, key=self._rounded_off))
 
     def at_pressure_ends(self, _: Random) -> Iterator[Codes]:
-        """Both pressures at their least and largest valid codes and at no pressure: the drop turned round too."""
+        """Both pressures at their least and largest valid codes and at no pressure: a drop below zero too."""
         ends = [(*sensor.valid_codes, sensor.zero_code) for sensor in (self._a, self._b)]
         for away, p_a, p_b in product((0, self._middle), *ends):
             yield Codes(self._code(away), p_a, p_b)
@@ -186,7 +189,7 @@ class _Side:
 
     def _least_drop(self, pairs: list[tuple[int, int]]) -> tuple[int, int]:
         """Return the pair of the least pressure drop that no failed sensor makes, or of the nearest to that."""
-        drops = [self._signals.difference(*pair, self._sign) for pair in pairs]
+        drops = [self._pair.difference(*pair) for pair in pairs]
         ranked = [(drop < -self._compensator.reverse_codes, abs(drop)) for drop in drops]
         return pairs[ranked.index(min(ranked))]
 
@@ -203,22 +206,16 @@ class _Side:
 
     def _rounded_off(self, pair: tuple[int, int]) -> int:
         """Return by how much a pair's difference was rounded down, of `WEIGHT_UNIT`; of like sensors nothing."""
-        return self._turn * (self._b.zero_code - pair[1]) * self._weight_b % WEIGHT_UNIT
+        return (self._b.zero_code - pair[1]) * self._pair.weight % WEIGHT_UNIT
 
     def _code_of_a(self, drop: int, p_b: int) -> int:
-        return self._slant[p_b - self._b.valid_codes[0]] + self._turn * drop
+        return self._slant[p_b - self._b.valid_codes[0]] + drop
 
     def _codes_of_b(self, drop: int) -> range:
-        """Return the codes of sensor B for which a valid one of sensor A makes a drop."""
-        low, high = (code - self._turn * drop for code in self._a.valid_codes)
+        """Return the codes behind for which a valid one ahead makes a drop."""
+        low, high = (code - drop for code in self._a.valid_codes)
         first = self._b.valid_codes[0]
         return range(first + bisect_left(self._slant, low), first + bisect_right(self._slant, high))
-
-
-def _slant(signals: Signals, p_b: int, sign: int) -> int:
-    """Return the code of sensor A that makes no difference with one of sensor B."""
-    zero = signals.pressure_a.zero_code
-    return zero - (-1 if sign < 0 and signals.swapped else 1) * signals.difference(zero, p_b, sign)
 
 
 def _about(signal: CommandSignal | PressureSignal, signals: Signals) -> list[int]:

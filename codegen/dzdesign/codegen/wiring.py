@@ -10,7 +10,7 @@ from fractions import Fraction
 from dzdesign.codegen.core.constants import Values
 from dzdesign.core.errors import one_line
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.pressure_inputs import input_columns, negative_drop_in_words
+from dzdesign.design.pressure_inputs import input_columns, negative_drop_in_words, what_machine_switches
 from dzdesign.design.signals import CommandSignal, PressureSignal
 from dzdesign.design.target_inputs import Converter
 
@@ -69,11 +69,12 @@ def wiring_of(compensator: Compensator, converter: Converter) -> Values:
         "no_voltage": _no_voltage(command, signals.signs),
         "no_voltage_drives": any(command.from_zero(0, sign) for sign in signals.signs) and command.valid_codes[0] == 0,
         "pressures": tuple(
-            _pressure(name, signal, converter, compensator)
-            for name, signal in (("A", signals.pressure_a), ("B", signals.pressure_b))
+            _pressure(name, signal, converter, compensator) for name, signal in signals.pressures.items()
         ),
         # How the pressure drop of negative commands comes of the inputs; empty for a command of one sign.
         "negative_drop": _in_a_table(negative_drop_in_words(compensator)).replace("negative", "Negative", 1),
+        # What the machine must switch at negative commands; nothing of most.
+        "switched": _in_a_table(what_machine_switches(compensator)),
         "current": _current(compensator, converter),
     }
 
@@ -121,7 +122,7 @@ def _in_a_table(text: str) -> str:
 
 def _pressure(name: str, signal: PressureSignal, converter: Converter, compensator: Compensator) -> Values:
     """Return one sensor at no pressure and at its span, and the column of the recordings that it stands for."""
-    units, columns = compensator.valve.recorded_units, dict(zip("AB", input_columns(compensator) or (), strict=False))
+    units, columns = compensator.valve.recorded_units, input_columns(compensator)
     zero, full = (PinReading(code=code, converter=converter) for code in (signal.zero_code, signal.full_code))
     return {
         "name": name,

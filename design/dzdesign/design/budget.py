@@ -39,6 +39,7 @@ STATED: Mapping[Component, _Stated] = {
     "bench pressure drop": _Stated("--bench-pressure-error", "MPa", "bench_pressure_error_MPa"),
     "pressure sensor A": _Stated("--pressure-error", "MPa", "pressure_error_a_MPa"),
     "pressure sensor B": _Stated("--pressure-error", "MPa", "pressure_error_b_MPa"),
+    "pressure sensor C": _Stated("--pressure-error", "MPa", "pressure_error_c_MPa"),
     "pressure converter offset": _Stated("--pressure-converter", "codes", "pressure_offset_codes"),
     "pressure converter gain": _Stated("--pressure-converter", "codes", "pressure_gain_codes"),
     "pressure converter noise": _Stated("--pressure-converter", "codes", "pressure_noise_codes"),
@@ -64,7 +65,7 @@ def budget_of(
     machine: Machine | None,
 ) -> Budget:
     """Return the budget of a side at its tested pressure drops, from the curve that its certificate is of."""
-    stated, signals = side.certified[guard], allowance.signals
+    stated, pair = side.certified[guard], allowance.pair
     # The guarded threshold as the recordings have it, which no bound holds.
     recorded = replace(
         curve,
@@ -73,12 +74,12 @@ def budget_of(
         certified=None,
     )
     # At the tests, none beyond the last of them: there another rule begins.
-    exact = [signals.dp_code(dp) for dp in recorded.dp_MPa]
+    exact = [pair.dp_code(dp) for dp in recorded.dp_MPa]
     codes = [min(round(code), floor(exact[-1])) for code in exact]
 
     @cache
     def value_V(of_recording: bool, code: int) -> Fraction:
-        return certified_V(recorded if of_recording else curve, signals.dp_MPa(code))
+        return certified_V(recorded if of_recording else curve, pair.dp_MPa(code))
 
     def limits_V(allowed: Allowance, *, of_recording: bool = False) -> list[Fraction]:
         """Return the largest offset that an allowance leaves at the tests' codes."""
@@ -131,7 +132,7 @@ def _half_width(
     if component == RECORDING:
         return max(contributions_mV)
     if component == "rounding of pressures":
-        low, high = allowance.signals.difference_error(allowance.sign)
+        low, high = allowance.pair.difference_error(allowance.signals.code_max)
         return Fraction(max(-low, high))
     if component in ("rounding of the drive", "dither"):
         return allowance.shares[component] * allowance.signals.compare_max

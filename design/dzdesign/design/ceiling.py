@@ -22,7 +22,7 @@ from dzdesign.core.recorded_units import worded
 from dzdesign.design.design_choices import Above
 from dzdesign.design.exact_row import ExactRow
 from dzdesign.design.machine import Allowance, Machine
-from dzdesign.design.signals import Signals
+from dzdesign.design.signals import PressurePair
 from dzdesign.identify.valve.certified_bound import BoundPiece, CertifiedBound
 from dzdesign.identify.valve.guard_curve import CertifiedCurve
 
@@ -171,9 +171,9 @@ def certified_V(curve: OffsetCurve, dp_MPa: Fraction) -> Fraction:
 
 #: Value at zero, V, and slope, V/MPa.
 Line = tuple[Fraction, Fraction]
-#: Curve, signals, first and last code of the latest rows. Found again by comparing: a hash of that many fractions takes
-#: longer.
-KNOWN: deque[tuple[OffsetCurve, Signals, int, int, ExactRow]] = deque(maxlen=8)
+#: Curve, pressure inputs, first and last code of the latest rows. Found again by comparing: a hash of that many
+#: fractions takes longer.
+KNOWN: deque[tuple[OffsetCurve, PressurePair, int, int, ExactRow]] = deque(maxlen=8)
 
 
 class _Span(NamedTuple):
@@ -187,13 +187,13 @@ class _Span(NamedTuple):
     least_V: Fraction | None = None
 
 
-def certified_row(curve: OffsetCurve, signals: Signals, first: int, last: int) -> ExactRow:
+def certified_row(curve: OffsetCurve, pair: PressurePair, first: int, last: int) -> ExactRow:
     """Return what is certified at each of the codes, V, as `certified_V` does; kept for whoever proves it again."""
-    for known, of_signals, begin, end, row in tuple(KNOWN):
-        if (begin, end) == (first, last) and (known is curve or known == curve) and of_signals == signals:
+    for known, of_pair, begin, end, row in tuple(KNOWN):
+        if (begin, end) == (first, last) and (known is curve or known == curve) and of_pair == pair:
             return row
-    row = _held_under(curve, offset_row(curve, signals, first, last), signals.dp_MPa(1), first)
-    KNOWN.append((curve, signals, first, last, row))
+    row = _held_under(curve, offset_row(curve, pair, first, last), pair.dp_MPa(1), first)
+    KNOWN.append((curve, pair, first, last, row))
     return row
 
 
@@ -222,9 +222,9 @@ def _bounds(curve: OffsetCurve, step: Fraction, first: int, end: int) -> Iterato
         yield *codes, _Span(None, _chord(piece), least_V=least_V)
 
 
-def offset_row(curve: OffsetCurve, signals: Signals, first: int, last: int) -> ExactRow:
+def offset_row(curve: OffsetCurve, pair: PressurePair, first: int, last: int) -> ExactRow:
     """Return the offset at each of the codes, V, whatever is certified."""
-    step, parts, begin = signals.dp_MPa(1), [], first
+    step, parts, begin = pair.dp_MPa(1), [], first
     for span in _spans(curve):
         end = last + 1 if span.to_MPa is None else min(max(floor(span.to_MPa / step), begin - 1), last) + 1
         parts.append(_values(span, step, range(begin, end)))
@@ -297,19 +297,19 @@ def offset_ceiling(curve: OffsetCurve, u_max_V: Fraction, allowance: Allowance) 
     threshold furthest, less what rounding and the dither add to the drive. A curve that lies above its bound somewhere
     is refused: valve.json contradicts itself.
     """
-    signals = allowance.signals
-    first, last = (signals.dp_code(end) for end in (curve.dp_MPa[0], curve.dp_MPa[-1]))
-    code_max = signals.largest_difference(allowance.sign)
+    pair = allowance.pair
+    first, last = (pair.dp_code(end) for end in (curve.dp_MPa[0], curve.dp_MPa[-1]))
+    code_max = pair.largest_difference
     if last > code_max:
         raise InputError(
             worded(
                 "the sensor's span of {span:g MPa} ends below the tested pressure drop of {tested:g MPa}; give the "
                 "real span with --pressure-span",
-                span=float(signals.pressure_a.span_MPa),
+                span=float(pair.ahead.span_MPa),
                 tested=float(curve.dp_MPa[-1]),
             )
         )
     low, high = allowance.window
     factor, kept = allowance.factor / u_max_V, allowance.kept
-    least = certified_row(curve, signals, low, code_max + high).least_of_windows(high - low + 1)
+    least = certified_row(curve, pair, low, code_max + high).least_of_windows(high - low + 1)
     return OffsetCeiling(limit=least.line(factor, kept), certified=range(ceil(first), floor(last) + 1))

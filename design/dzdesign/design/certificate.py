@@ -59,11 +59,11 @@ class GuardedSide:
         The table is of nodes of beta over `denominator`, `u_min0` is the law's over u_max. An offset above the ceiling
         is refused.
         """
-        signals, curve, tested = self.allowance.signals, self.curve, self.ceiling.certified
+        curve, tested = self.curve, self.ceiling.certified
         margins = TableMargins(limit=self.ceiling.limit, nodes=table, unit=u_min0 / (denominator * STEP_CODES))
         margin = _smallest_margin(margins, tested, lets_go=curve.above is not None)
-        losses = _losses_V(curve, tested, signals, margins, self.u_max_V)
-        holds_to, released_from = _above(curve, tested, signals, margins)
+        losses = _losses_V(curve, tested, self.allowance, margins, self.u_max_V)
+        holds_to, released_from = _above(curve, tested, self.allowance, margins)
         certificate = Certificate(
             confidence=self.side.certificate.confidence,
             guard=self.guard,
@@ -175,21 +175,21 @@ def _smallest_margin(margins: TableMargins, tested: range, *, lets_go: bool) -> 
 
 
 def _above(
-    curve: OffsetCurve, tested: range, signals: Signals, margins: TableMargins
+    curve: OffsetCurve, tested: range, allowance: Allowance, margins: TableMargins
 ) -> tuple[Fraction, Fraction | None]:
     """Return up to which pressure drop the certificate holds, and from which the offset is released, MPa.
 
     Above the tests it holds as far as the continued bound does, code by code, and where the drive is zero whatever the
     threshold. An offset that is released is one unit of beta.
     """
-    tests_end, count = curve.dp_MPa[-1], len(margins.limit)
+    tests_end, count, pair = curve.dp_MPa[-1], len(margins.limit), allowance.pair
     if curve.above is None or tested.stop >= count:
         return tests_end, None
-    last = _holds_to(tested.stop, signals, margins) if curve.above.certified else None
-    holds_to = tests_end if last is None else max(signals.dp_MPa(last), tests_end)
+    last = _holds_to(tested.stop, allowance.signals, margins) if curve.above.certified else None
+    holds_to = tests_end if last is None else max(pair.dp_MPa(last), tests_end)
     driven = np.flatnonzero(margins.numerators[tested.stop :] > STEP_CODES)
     released_from = tested.stop + (int(driven[-1]) + 1 if driven.size else 0)
-    return holds_to, max(signals.dp_MPa(released_from), tests_end) if released_from < count else None
+    return holds_to, max(pair.dp_MPa(released_from), tests_end) if released_from < count else None
 
 
 def _holds_to(first: int, signals: Signals, margins: TableMargins) -> int | None:
@@ -203,11 +203,11 @@ def _holds_to(first: int, signals: Signals, margins: TableMargins) -> int | None
 
 
 def _losses_V(
-    curve: OffsetCurve, tested: range, signals: Signals, margins: TableMargins, u_max_V: Fraction
+    curve: OffsetCurve, tested: range, allowance: Allowance, margins: TableMargins, u_max_V: Fraction
 ) -> list[float]:
     """Return by how much the table's offset lies under the certified curve at each certified code, V."""
     codes, unit_V = tested or range(1), margins.unit * u_max_V
-    offset = offset_row(curve, signals, codes.start, codes.stop - 1)
+    offset = offset_row(curve, allowance.pair, codes.start, codes.stop - 1)
     table = margins.numerators[codes.start : codes.stop].tolist()
     up, unit = unit_V.numerator, unit_V.denominator
     triples = zip(offset.numerators, offset.denominators, table, strict=True)

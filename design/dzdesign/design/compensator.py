@@ -138,6 +138,8 @@ class Compensator(ShownInNotebooks, Artefact):
                 raise RuleError(f"{name} is {value}, expected a power of two, so that the firmware needs no division")
         if (self.negative is None) != (len(self.signals.signs) == 1):
             raise RuleError("a command of both signs needs a law for both sides, one of one sign for one")
+        if self.current_drive is not None and self.current_drive.loop.two != (self.negative is not None):
+            raise RuleError("a current loop of two solenoids needs a law for both sides, one of one solenoid for one")
         limit, command = self.drive_functions.compare_limit, self.signals.command
         if limit > self.signals.compare_max:
             raise RuleError(f"the compare limit is {limit}, above full drive, {self.signals.compare_max}")
@@ -204,7 +206,7 @@ class Compensator(ShownInNotebooks, Artefact):
 
     def nodes(self, sign: int = 1) -> int:
         """Return the number of nodes that beta needs to cover every pressure-code difference."""
-        return self.signals.largest_difference(sign) // self.beta_step_codes + 2
+        return self.signals.pair(sign).largest_difference // self.beta_step_codes + 2
 
     def beta(self, dp_code: int, sign: int = 1) -> Fraction:
         """Return the exact certified beta at a pressure-code difference."""

@@ -38,7 +38,7 @@ def colder_coil(compensator: Compensator, sign: int) -> ColderCoil:
     thresholds = side.certified[compensator.side(sign).certificate.guard].u_threshold_V
     found = []
     for test, threshold_V in zip(side.tests, thresholds, strict=True):
-        dp_code = compensator.signals.code_at(test.dp_MPa)
+        dp_code = compensator.signals.pair(sign).code_at(test.dp_MPa)
         # The coil has the current that the bench's coil had at a command higher by the ratio of the resistances.
         reached_V = corners_of(compensator, dp_code, sign).offset * u_max_V / factor
         branch = test.recorded.closing
@@ -97,7 +97,7 @@ def _jump(compensator: Compensator, machine: Machine, sign: int) -> str:
     """Say what the transition's end passes on the machine that opens earliest."""
     factor, found = float(machine.least_factor), []
     for test in compensator.valve.sides[SIDE_NAMES[sign]].tests:
-        dp_code = compensator.signals.code_at(test.dp_MPa)
+        dp_code = compensator.signals.pair(sign).code_at(test.dp_MPa)
         at_end_V = corners_of(compensator, dp_code, sign).at_end * float(compensator.u_max_V)
         found.append(float(test.recorded.opening.flow_at(np.array([at_end_V / factor]))[0]))
     share = compensator.transition_end / compensator.signals.command.span(sign)
@@ -285,7 +285,7 @@ def _lift_V(compensator: Compensator) -> float:
     """Return by how much the declared error of a zero command lifts the drive at dP0, V."""
     command = compensator.signals.command
     reference = compensator.valve.positive.reference.dp_MPa or 0.0
-    dp_code = compensator.signals.code_at(reference)
+    dp_code = compensator.signals.pair(1).code_at(reference)
     at = (0, min(compensator.command_error.zero_band_codes, command.span(1)))
     low, high = (compensator.drive(command.zero_code + command.direction(1) * each, dp_code) for each in at)
     return float((high - low) * compensator.u_max_V)

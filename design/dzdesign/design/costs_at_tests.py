@@ -118,8 +118,8 @@ def costs_at_tests(compensator: Compensator, sign: int) -> tuple[CostAtTest, ...
 
 def _cost_at_test(compensator: Compensator, test: TestResult, sign: int) -> CostAtTest:
     side, u_max = SIDE_NAMES[sign], float(compensator.u_max_V)
-    corners = corners_of(compensator, compensator.signals.code_at(test.dp_MPa), sign)
-    corners_of_falling = falling_corners(compensator, compensator.signals.code_at(test.dp_MPa), sign)
+    corners = corners_of(compensator, compensator.signals.pair(sign).code_at(test.dp_MPa), sign)
+    corners_of_falling = falling_corners(compensator, compensator.signals.pair(sign).code_at(test.dp_MPa), sign)
     offset_V, left = corners.offset * u_max, remaining_dead_zone(compensator, test, sign)
     knees = {"opening": test.u_knee_rising_V, "closing": test.u_knee_falling_V}
     above = {name: offset_V - knee for name, knee in knees.items() if knee is not None and knee < offset_V}
@@ -166,7 +166,7 @@ def remaining_dead_zone(compensator: Compensator, test: TestResult, sign: int = 
     share is 0 where flow passes at zero command.
     """
     knees = {"opening": test.u_knee_rising_V, "closing": test.u_knee_falling_V}
-    return _commands_at(compensator, compensator.signals.code_at(test.dp_MPa), sign, knees)
+    return _commands_at(compensator, compensator.signals.pair(sign).code_at(test.dp_MPa), sign, knees)
 
 
 def last_opening(compensator: Compensator, test: TestResult, sign: int) -> float | None:
@@ -176,7 +176,7 @@ def last_opening(compensator: Compensator, test: TestResult, sign: int) -> float
     knee = float(compensator.machine.largest_factor) * test.u_knee_rising_V / float(compensator.u_max_V)
     if knee > compensator.drive_functions.compare_limit / compensator.signals.compare_max:
         return inf
-    return corners_of(compensator, compensator.signals.code_at(test.dp_MPa), sign).command_at(knee)
+    return corners_of(compensator, compensator.signals.pair(sign).code_at(test.dp_MPa), sign).command_at(knee)
 
 
 def between_tests(compensator: Compensator, sign: int) -> float:
@@ -194,11 +194,12 @@ def between_tests(compensator: Compensator, sign: int) -> float:
     if len(known) < len(tests):
         return 0.0
     dp_MPa, knees_V = zip(*known, strict=True)
-    low, high = (compensator.signals.code_at(end) for end in (dp_MPa[0], dp_MPa[-1]))
+    pair = compensator.signals.pair(sign)
+    low, high = (pair.code_at(end) for end in (dp_MPa[0], dp_MPa[-1]))
     step = compensator.beta_step_codes
     found = [0.0]
     for code in range((low // step + 1) * step, high, step):
-        knee = float(np.interp(float(compensator.signals.dp_MPa(code)), dp_MPa, knees_V))
+        knee = float(np.interp(float(pair.dp_MPa(code)), dp_MPa, knees_V))
         found.append(_commands_at(compensator, code, sign, {"opening": knee})["opening"])
     return max(found)
 
@@ -213,7 +214,7 @@ def read_dead_zone(compensator: Compensator, test: TestResult, sign: int = 1) ->
         "opening": recorded.rising.command_at(flow) if recorded.rising else None,
         "closing": recorded.falling.command_at(flow) if recorded.falling else None,
     }
-    return _commands_at(compensator, compensator.signals.code_at(test.dp_MPa), sign, thresholds)
+    return _commands_at(compensator, compensator.signals.pair(sign).code_at(test.dp_MPa), sign, thresholds)
 
 
 def falling_corners(compensator: Compensator, dp_code: int, sign: int) -> LawCorners:

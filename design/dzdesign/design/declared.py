@@ -3,7 +3,7 @@
 What is not declared of a machine takes a default, which is named in the file.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -17,12 +17,14 @@ from dzdesign.design.current.responses import CurrentRequest
 from dzdesign.design.design_choices import DIGITS, read_error
 from dzdesign.design.machine import COPPER_PER_K, REFERENCE_C, DriveKind, Machine
 from dzdesign.design.signal_text import PinSignal, parse_signal
-from dzdesign.design.signals import Signals
+from dzdesign.design.signals import PressureSignal, Signals
 from dzdesign.design.target_inputs import TargetInputs
 
 #: Options that only current control has a use for, and those that it needs.
 OF_CURRENT = ("coil", "rated_current", "current_signal", "supply_signal", "current_error", "bench_current")
 NEEDED = ("coil", "rated_current", "supply", "current_signal")
+#: Behind the signal of the current: each of two solenoids has a shunt.
+EACH = " each"
 #: Of the ends of a sensor's range: that of the decimal numbers in them.
 ROUNDING = 1e-9
 #: Supplies of machines, V.
@@ -36,7 +38,9 @@ CURRENT_CODES = 2
 FURTHER = ("pressure_error", "bench_pressure_error", "pressure_converter", "oil", "ageing")
 
 
-def current_request(text: Mapping[str, str], read: Mapping[str, Any], target: TargetInputs) -> CurrentRequest | None:
+def current_request(
+    text: Mapping[str, str], read: Mapping[str, Any], target: TargetInputs, signals: Signals
+) -> CurrentRequest | None:
     """Return what is declared for current control; None for a drive by duty. Options come as texts and as read."""
     if text["drive"] == "duty":
         if useless := [flag_of(name) for name in OF_CURRENT if text[name]]:
@@ -55,7 +59,13 @@ def current_request(text: Mapping[str, str], read: Mapping[str, Any], target: Ta
         circuit = CoilCircuit(rated_A=read["rated_current"], supply_V=read["supply"], **read["coil"])
     except RuleError as error:
         raise InputError(f"--coil, --rated-current and --supply: {error}") from error
-    sensor = parse_signal(text["current_signal"], "--current-signal")
+    shunts, solenoids = 1 + text["current_signal"].endswith(EACH), len(signals.signs)
+    if shunts > solenoids:
+        raise InputError(
+            f"--current-signal is {quoted(text['current_signal'])}, but a command of one sign drives one solenoid; "
+            f"leave out '{EACH.strip()}'"
+        )
+    sensor = parse_signal(text["current_signal"].removesuffix(EACH), "--current-signal")
     sensor.check_within(target.converter)
     _check_measured(sensor, "--current-signal", "A", OVER_SHARE * circuit.rated_A)
     supply = parse_signal(text["supply_signal"], "--supply-signal") if text["supply_signal"] else None
@@ -70,6 +80,8 @@ def current_request(text: Mapping[str, str], read: Mapping[str, Any], target: Ta
         ),
         sampling=target.current_sampling,
         converter=target.converter,
+        solenoids=solenoids,
+        shunts=shunts,
     )
 
 
@@ -105,7 +117,7 @@ def machine_of(
     text: Mapping[str, str],
     read: Mapping[str, Any],
     target: TargetInputs,
-    signals: Signals,
+    sensors: Sequence[PressureSignal],
     current: CurrentRequest | None,
 ) -> Machine | None:
     """Return the declared machine; None where none was declared. Options come as texts and as read.
@@ -122,7 +134,7 @@ def machine_of(
     if current is not None:
         _take_current(keys, text, read, current)
         _check_coil(keys.values, current, text)
-    _take_pressures(keys, text, read, signals, target)
+    _take_pressures(keys, text, read, sensors, target)
     keys.take("oil_error", read["oil"], DEFAULT_OIL, "0.2 %, the paper's Fig. 22")
     keys.take("ageing_error", read["ageing"], DEFAULT_AGEING, "0.5 %, a convention that no recording shows")
     try:
@@ -218,14 +230,20 @@ def _check_coil(keys: Mapping[str, Any], current: CurrentRequest, text: Mapping[
 
 
 def _take_pressures(
-    keys: _Keys, text: Mapping[str, str], read: Mapping[str, Any], signals: Signals, target: TargetInputs
+    keys: _Keys,
+    text: Mapping[str, str],
+    read: Mapping[str, Any],
+    sensors: Sequence[PressureSignal],
+    target: TargetInputs,
 ) -> None:
     """Take the errors of the sensors, of the bench's, and of the converter on their channels."""
-    spans = (signals.pressure_a.span_MPa, signals.pressure_b.span_MPa)
+    spans = [sensor.span_MPa for sensor in sensors]
     parts = [part.strip() for part in text["pressure_error"].split("/")]
-    if len(parts) > 2:
-        raise InputError(f"--pressure-error is {quoted(text['pressure_error'])}, expected one error, or those of A / B")
-    for name, part, span in zip("ab", (parts[0], parts[-1]), spans, strict=True):
+    if len(parts) > len(spans):
+        raise InputError(
+            f"--pressure-error is {quoted(text['pressure_error'])}, expected one error, or those of A / B, or A / B / C"
+        )
+    for name, part, span in zip("abc", (parts[0], parts[min(1, len(parts) - 1)], parts[-1]), spans, strict=True):
         declared = _pressure(part, span, "--pressure-error") if part else None
         default, source = round(float(DEFAULT_SENSOR * span), DIGITS), "0.1 % of the span, as the paper's sensors"
         keys.take(f"pressure_error_{name}_MPa", declared, default, source)
@@ -233,7 +251,7 @@ def _take_pressures(
     keys.take(
         "bench_pressure_error_MPa",
         _pressure(bench, spans[0], "--bench-pressure-error") if bench else None,
-        round(float(DEFAULT_SENSOR * sum(spans)), DIGITS),
+        round(float(DEFAULT_SENSOR * sum(spans[:2])), DIGITS),
         "two sensors of 0.1 % of the span, as the paper's",
     )
     converter, errors = target.converter, read["pressure_converter"] or (None, None, None)

@@ -24,7 +24,8 @@ BELOW_DP0: tuple[BelowDp0, ...] = get_args(BelowDp0)
 Above = Literal["hold", "lower", "release"]
 ABOVE: tuple[Above, ...] = get_args(Above)
 POLARITIES = ("normal", "inverted")
-NegativeDp = Literal["recorded", "same", "swapped", "wired"]
+#: Pressure drop at negative commands: of a pair of inputs, the one ahead first, or what says which.
+NegativeDp = Literal["recorded", "wired", "A-B", "B-A", "A-C", "C-A", "B-C", "C-B"]
 NEGATIVE_DP: tuple[NegativeDp, ...] = get_args(NegativeDp)
 HYSTERESIS = ("keep", "play")
 ON_OFF = ("on", "off")
@@ -148,12 +149,12 @@ def _crystal(text: str, option: str) -> int:
 
 
 def _channels(text: str, option: str) -> tuple[str, ...]:
-    """Read the names of the converter's channels: of command, pressure A and pressure B, then of current and supply."""
+    """Read the names of the converter's channels: of command and pressures, then of current and supply."""
     names = tuple(text.upper().replace(",", " ").split())
-    if not 3 <= len(names) <= 5 or len(set(names)) < len(names) or not all(map(CHANNEL.fullmatch, names)):
+    if not 3 <= len(names) <= 7 or len(set(names)) < len(names) or not all(map(CHANNEL.fullmatch, names)):
         raise InputError(
-            f"{option} is {quoted(text)}, expected the channels of command, pressure A and pressure B (then of the "
-            "current and the supply, where they are read), each once, such as 'A0 A1 A2'"
+            f"{option} is {quoted(text)}, expected the channels of command, pressure A and pressure B (then of "
+            "pressure C, the current and the supply, where they are read), each once, such as 'A0 A1 A2'"
         )
     return names
 
@@ -186,7 +187,7 @@ class DesignChoices:
 
     drive: Annotated[Text, Option("D", DRIVE, "duty", choices=DRIVES)] = None
     """Output of the law. duty: the PWM's share of the supply voltage. current: the set point of a current loop in the
-    firmware, for one solenoid, with the rated current as full drive."""
+    firmware, with the rated current as full drive."""
     coil: Annotated[Text, Option("C", DRIVE, example="3.5 ohm 40 mH", read=_coil)] = None
     """Coil for --drive current, such as "3.5 ohm 40 mH". The form "3.5 + 0.5 ohm x 0.75..1.35, 40 mH x 0.5..1.5" adds
     the resistance of switch and shunt and the ranges, here with their defaults."""
@@ -194,7 +195,8 @@ class DesignChoices:
     """Current at full drive, for --drive current."""
     current_signal: Annotated[Text, Option("S", DRIVE, example="0..1.2 A on 2 ohm + 0.15 V")] = None
     """Signal of the current sensor at the converter, for --drive current, such as "0..1.2 A on 2 ohm + 0.15 V". The
-    resistance is that of the shunt times its amplifier's gain, and the voltage is the one without current."""
+    resistance is that of the shunt times its amplifier's gain, and the voltage is the one without current. With two
+    solenoids it is of one shunt for both, or with "each" behind it of one shunt for each."""
     supply_signal: Annotated[Text, Option("S", DRIVE, example="0..36 V x 0.075")] = None
     """Signal of the supply voltage at the converter, for --drive current, such as "0..36 V x 0.075" (default: not
     measured). Measuring it makes the current loop faster."""
@@ -219,7 +221,7 @@ class DesignChoices:
     the rated current, to 1 %)."""
     pressure_error: Annotated[Text, Option("E", MACHINE, example="0.1 %")] = None
     """Error of the pressure sensors, offset and gain together (default: 0.1 %). It is a share of the span or a
-    pressure, such as "0.1 %" or "0.02 MPa", or "0.1 % / 0.5 %" for A and B."""
+    pressure, such as "0.1 %" or "0.02 MPa", or "0.1 % / 0.5 %" for A and B, and a third one for C."""
     bench_pressure_error: Annotated[Text, Option("E", MACHINE, example="0.02 MPa")] = None
     """Error of the recorded pressure drop, as a pressure or as a share of the span (default: two sensors of 0.1 %)."""
     pressure_converter: Annotated[Text, Option("E", MACHINE, example="15 + 30 + 4 codes", read=_converter_errors)] = (
@@ -269,22 +271,25 @@ class DesignChoices:
     pressure_span: Annotated[Text, Option("P", CONNECTIONS, "20 MPa", example="20 MPa", read=quantity("pressure"))] = (
         None
     )
-    """Span of both pressure sensors."""
+    """Span of the pressure sensors."""
     pressure_a: Annotated[Text, Option("S", CONNECTIONS, example="4..20 mA on 140 ohm")] = None
     """Signal of the sensor upstream of the metering edge, such as "4..20 mA on 140 ohm = 25 MPa". The default is 4..20
     mA on a shunt that keeps 21 mA within the converter's range, 140 ohm for 3 V."""
     pressure_b: Annotated[Text, Option("S", CONNECTIONS, example="4..20 mA on 140 ohm")] = None
     """Signal of the sensor downstream of the metering edge (default: as upstream)."""
+    pressure_c: Annotated[Text, Option("S", CONNECTIONS, example="4..20 mA on 140 ohm")] = None
+    """Signal of the third sensor, which only negative commands use (default: as upstream)."""
     negative_dp: Annotated[Text, Option("D", CONNECTIONS, "recorded", choices=NEGATIVE_DP)] = None
-    """Pressure drop at negative commands, of the two pressure inputs. recorded: as the recordings show it, and same if
-    they do not. same: A minus B, as at positive commands. swapped: B minus A. wired: the machine switches the inputs,
-    so that A minus B is the metering drop at both signs."""
+    """Pressure drop at negative commands, of two pressure inputs, such as A-C for A minus C; C is a third input.
+    recorded: as the recordings show it, and A-B, as at positive commands, if they do not. wired: the machine switches
+    the inputs, so that A minus B is the metering drop at both signs."""
     crystal: Annotated[Text, Option("F", BOARD, example="30 MHz", read=_crystal)] = None
     """Frequency of the board's crystal or oscillator, for target f28335 (default: 30 MHz). Processor and PWM get the
     fastest clock that it allows. Target f280049c takes the clock of TI's device.h."""
     channels: Annotated[Text, Option("C", BOARD, example="A0 A1 A2", read=_channels)] = None
     """Channels of the converter for command, pressure A and pressure B, of the targets f28335 and f280049c (default:
-    "A0 A1 A2"). With --drive current those of the current and of a measured supply follow (default: "A3 A4")."""
+    "A0 A1 A2"). That of a third pressure follows (default: "A6"), then with --drive current those of the current, of
+    two shunts one each (default: "A3", and "A5" of the second), and of a measured supply (default: "A4")."""
     ramp_up: Annotated[Text, Option("T", DRIVE, "0 s", example="0.5 s", read=_times)] = None
     """Time from zero to full command, such as "0.5 s", or "0.5 s / 0.8 s" for positive and negative commands."""
     ramp_down: Annotated[Text, Option("T", DRIVE, "0 s", example="0.5 s", read=_times)] = None

@@ -27,10 +27,10 @@ from dzdesign.design.costs import costs_of
 from dzdesign.design.costs_at_tests import branch_commands, corners_of
 from dzdesign.design.machine import allowance_of, check_bench_current, dither_reserve
 from dzdesign.design.options import DesignOptions
-from dzdesign.design.pressure_inputs import ACCEPTED, refuse_hidden_failures, with_negative_drop
+from dzdesign.design.pressure_inputs import ACCEPTED, refuse_hidden_failures, with_pressure_inputs
 from dzdesign.design.side_design import finest_that_fit, finest_units, refuse_two_signs, side_law
 from dzdesign.design.side_law import Sides
-from dzdesign.design.signals import SIDE_NAMES
+from dzdesign.design.signals import SIDE_NAMES, Signals
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.reading_flow import default_reading_flow
 
@@ -69,7 +69,8 @@ def _designed(valve: ValveModel, options: DesignOptions) -> Compensator:
     law(options.law)
     if len(options.signals.signs) == 2:
         refuse_two_signs(valve, options.guard)
-        options = with_negative_drop(valve, options)
+    options = with_pressure_inputs(valve, options)
+    options.check_channels()
     signals = options.signals
     u_max = _full_command(valve, options)
     if options.current is not None and (machine := options.machine) is not None:
@@ -98,7 +99,7 @@ def _designed(valve: ValveModel, options: DesignOptions) -> Compensator:
         sides=Sides(positive=laws[1], negative=laws.get(-1)),
         beta_denominator=units.beta,
         beta_step_codes=STEP_CODES,
-        reverse_codes=int(REVERSE_SHARE * (signals.pressure_a.full_code - signals.pressure_a.zero_code)),
+        reverse_codes=_reverse_codes(signals),
         transition_codes=transition_codes,
         reading_flow_L_min=options.reading_flow_L_min or default_reading_flow(valve),
         zero_band_codes=options.error.zero_band_codes if transition_codes else 0,
@@ -116,6 +117,12 @@ def _designed(valve: ValveModel, options: DesignOptions) -> Compensator:
     if options.play:
         compensator = with_play(compensator, options.dither_text)
     return replace(compensator, costs=costs_of(compensator))
+
+
+def _reverse_codes(signals: Signals) -> int:
+    """Return a share of the fewest codes that the sensor ahead of a side has for its span."""
+    ahead = (signals.pair(sign).ahead for sign in signals.signs)
+    return int(REVERSE_SHARE * min(sensor.full_code - sensor.zero_code for sensor in ahead))
 
 
 def _full_command(valve: ValveModel, options: DesignOptions) -> Fraction:
@@ -215,7 +222,7 @@ def _recorded_widths(compensator: Compensator, sign: int) -> Iterator[list[tuple
     for test in compensator.valve.sides[SIDE_NAMES[sign]].tests:
         if test.u_knee_rising_V is None or test.u_knee_falling_V is None:
             continue
-        corners = corners_of(compensator, compensator.signals.code_at(test.dp_MPa), sign)
+        corners = corners_of(compensator, compensator.signals.pair(sign).code_at(test.dp_MPa), sign)
         u_max = float(compensator.u_max_V)
         found = [(corners.command_at(up / u_max), up - down) for up, down in branch_commands(test)]
         rising = [place for place, (left, right) in enumerate(pairwise(found)) if left[0] < right[0] < 1]

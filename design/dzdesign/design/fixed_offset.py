@@ -148,7 +148,7 @@ def full_drive(compensator: Compensator, dp_MPa: Fraction, sign: int = 1) -> Fra
     signals = compensator.signals
     command, limit = signals.command, compensator.drive_functions.compare_limit
     code = command.zero_code + command.direction(sign) * command.span(sign)
-    drive = compensator.drive(code, round(signals.dp_code(dp_MPa)), sign)
+    drive = compensator.drive(code, round(signals.pair(sign).dp_code(dp_MPa)), sign)
     return min(drive, Fraction(limit, signals.compare_max))
 
 
@@ -176,7 +176,7 @@ def pressure_line(
             )
         )
     signals = compensator.signals
-    command, dp_code = signals.command, round(signals.dp_code(dp_MPa))
+    command, dp_code = signals.command, round(signals.pair(sign).dp_code(dp_MPa))
     limit = Fraction(compensator.drive_functions.compare_limit, signals.compare_max)
 
     def law(share: Fraction) -> Fraction:
@@ -221,7 +221,7 @@ def dead_zones(compensator: Compensator, characteristic: Characteristic, sign: i
 
 def _at_test(compensator: Compensator, characteristic: Characteristic, test: TestResult, sign: int) -> FixedDeadZone:
     end_code, signals = compensator.transition_end, compensator.signals
-    dp_code = signals.code_at(test.dp_MPa)
+    dp_code = signals.pair(sign).code_at(test.dp_MPa)
     knees = {"opening": test.u_knee_rising_V, "closing": test.u_knee_falling_V}
     by_law = falling_corners(compensator, dp_code, sign).at_end
     by_fixed = float(characteristic.drive(Fraction(end_code, signals.command.span(sign))))

@@ -195,7 +195,7 @@ def _common_interval(sides: Iterable[Mapping[str, OffsetCurve]]) -> tuple[float,
 
 def _side(batch: Mapping[str, Compensator], first: Compensator, sign: int) -> _Side:
     """Find the least ceiling of one sign of command, exactly, and which valves hold it down."""
-    signals, allowance = first.signals, first.allowance(sign)
+    pair, allowance = first.signals.pair(sign), first.allowance(sign)
     models = {name: each.valve.sides[SIDE_NAMES[sign]] for name, each in batch.items()}
     guard = first.side(sign).certificate.guard
     curves = {
@@ -207,11 +207,11 @@ def _side(batch: Mapping[str, Compensator], first: Compensator, sign: int) -> _S
         limit = offset_ceiling(curve, first.u_max_V, allowance).limit
         doubles.append(limit.doubles)
         least = [least_of([*least, limit])]
-    certified = range(ceil(signals.dp_code(Fraction(repr(low)))), floor(signals.dp_code(Fraction(repr(high)))) + 1)
+    certified = range(ceil(pair.dp_code(Fraction(repr(low)))), floor(pair.dp_code(Fraction(repr(high)))) + 1)
     ceiling = OffsetCeiling(limit=least[0], certified=certified)
     if ceiling.limit[: certified.stop].least() <= 0:
         raise InputError("one of the valves leaves no positive offset for a lot setting")
-    tested = floor(signals.dp_code(max(curve.dp_MPa[-1] for curve in curves.values()))) + 1
+    tested = floor(pair.dp_code(max(curve.dp_MPa[-1] for curve in curves.values()))) + 1
     above_least = np.array(doubles) - ceiling.limit.doubles
     near = above_least[:, :tested].min(axis=1) < CLEAR
     return _Side(
@@ -237,7 +237,7 @@ def _law(side: _Side, carrier: str, first: Compensator) -> SideLaw:
     reference = Fraction(repr(model.reference.dp_MPa))
     top = min(curve.at(reference) for curve in side.curves.values())
     if first.machine:
-        top = left_by_machine(top, side.least, first.signals, reference, u_max)
+        top = left_by_machine(top, side.least, first.allowance(side.sign), reference, u_max)
     scale = finest_units(first.signals, transition_codes=0).coefficient
     u_min0 = offset_at_reference(top / u_max, first.signals, scale)
     goes_on = any(curve.above is not None for curve in side.curves.values())
@@ -283,7 +283,7 @@ class _Drive:
     """The offsets of a compensator's law of a sign, code by code, and how far bounds lie above them."""
 
     def __init__(self, compensator: Compensator, sign: int) -> None:
-        law, count = compensator.side(sign), compensator.signals.largest_difference(sign) + 1
+        law, count = compensator.side(sign), compensator.signals.pair(sign).largest_difference + 1
         scale = compensator.beta_denominator * compensator.beta_step_codes
         self.allowance = compensator.allowance(sign)
         self.kept_V = self.allowance.kept * compensator.u_max_V
@@ -296,18 +296,18 @@ class _Drive:
 
     def nearest(self, piece: BoundPiece) -> Iterator[tuple[Fraction, Fraction]]:
         """Yield the margin, V, and the pressure drop, MPa, of places one of which comes nearest to a piece's bound."""
-        signals, (low, high) = self.allowance.signals, self.allowance.window
-        ends = [signals.dp_code(end) for end in (piece.from_MPa, piece.to_MPa)]
+        pair, (low, high) = self.allowance.pair, self.allowance.window
+        ends = [pair.dp_code(end) for end in (piece.from_MPa, piece.to_MPa)]
         codes = range(max(ceil(ends[0]), 0), min(floor(ends[1]) + 1, self.numerators.size))
         places = [piece.from_MPa, piece.to_MPa]
         if codes:
-            bounds, unit = at_codes(piece, signals.dp_MPa(1), codes)
+            bounds, unit = at_codes(piece, pair.dp_MPa(1), codes)
             up, down = self.allowance.factor / unit, self.unit_V
             one, other = up.numerator * down.denominator, down.numerator * up.denominator
             left = [bound * one - self.highest[code] * other for bound, code in zip(bounds, codes, strict=True)]
-            places.append(signals.dp_MPa(codes[left.index(min(left))]))
+            places.append(pair.dp_MPa(codes[left.index(min(left))]))
         for place in places:
-            code = signals.dp_code(place)
+            code = pair.dp_code(place)
             first, last = sorted((ceil(code) - high, floor(code) - low))  # between two codes both count
             first = max(min(first, self.numerators.size - 1), 0)
             read = int(self.numerators[first : max(last, first) + 1].max())

@@ -21,7 +21,7 @@ from dzdesign.core.units import measures, si_factor
 from dzdesign.design.current.drive import CurrentDrive
 from dzdesign.design.drive_functions import DrivenDither
 from dzdesign.design.side_law import Component
-from dzdesign.design.signals import Signals
+from dzdesign.design.signals import PressurePair, Signals
 from dzdesign.identify.valve.model import ValveModel
 
 #: Temperature coefficient of copper about 20 degC, 1/K (IEC 60028): R = R20 (1 + alpha (T - 20)).
@@ -75,6 +75,8 @@ class Machine:
     """Error of the sensor upstream of the metering edge, offset and gain combined."""
     pressure_error_b_MPa: Annotated[Pressure, quantity("MPa")]
     """Error of the sensor downstream of the metering edge, offset and gain combined."""
+    pressure_error_c_MPa: Annotated[Pressure, quantity("MPa")] | None = None
+    """Error of the third sensor, offset and gain combined; null without one."""
     bench_pressure_error_MPa: Annotated[Pressure, quantity("MPa")]
     """Error of the recorded pressure drop."""
     pressure_offset_codes: Error
@@ -107,6 +109,11 @@ class Machine:
             limit = LARGEST_MPa if name.endswith("_MPa") else LARGEST_SHARE
             if "_error" in name and value is not None and not 0 <= value <= limit:
                 raise RuleError(f"{name} is {value:g}, expected 0 to {limit:g}")
+
+    def pressure_error_MPa(self, name: str) -> float:
+        """Return the error of the sensor at a pressure input."""
+        error: float | None = getattr(self, f"pressure_error_{name.lower()}_MPa")
+        return error or 0.0
 
     @property
     def least_factors(self) -> dict[Component, Fraction]:
@@ -149,6 +156,12 @@ def _resistance(temperature_C: Fraction) -> Fraction:
     return 1 + COPPER_PER_K * (temperature_C - REFERENCE_C)
 
 
+#: Component of the error of each pressure sensor, by the name of its input.
+OF_SENSOR: Mapping[str, Component] = {
+    "A": "pressure sensor A", "B": "pressure sensor B", "C": "pressure sensor C"
+}  # fmt: skip
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Allowance:
     """Of one side: what rounding, dither and, where one was declared, the machine take."""
@@ -165,12 +178,17 @@ class Allowance:
     rounds: bool = True
 
     @property
+    def pair(self) -> PressurePair:
+        """The pressure inputs of the side."""
+        return self.signals.pair(self.sign)
+
+    @property
     def window(self) -> tuple[int, int]:
         """Differences of codes, from and to, that the pressure drop may be away from the one that is read."""
         half_width_MPa = sum(self.pressures_MPa.values(), start=Fraction(0))
         if self.rounds:
-            return self.signals.difference_error(self.sign, half_width_MPa)
-        codes = ceil(half_width_MPa / self.signals.pressure_a.per_code_MPa)
+            return self.pair.difference_error(self.signals.code_max, half_width_MPa)
+        codes = ceil(half_width_MPa / self.pair.ahead.per_code_MPa)
         return -codes, codes
 
     @property
@@ -217,11 +235,11 @@ def allowance_of(
     if machine.current_rest_error:
         shares["current's rest"] = Fraction(repr(machine.current_rest_error))
     # An offset of the converter may be of either sign on each channel: they do not cancel.
-    per_code = signals.pressure_a.per_code_MPa + signals.pressure_b.per_code_MPa
+    pair = signals.pair(sign)
+    per_code = pair.ahead.per_code_MPa + pair.behind.per_code_MPa
     pressures: dict[Component, Fraction] = {
         "bench pressure drop": Fraction(repr(machine.bench_pressure_error_MPa)),
-        "pressure sensor A": Fraction(repr(machine.pressure_error_a_MPa)),
-        "pressure sensor B": Fraction(repr(machine.pressure_error_b_MPa)),
+        **{OF_SENSOR[name]: Fraction(repr(machine.pressure_error_MPa(name))) for name in sorted(pair.names)},
         "pressure converter offset": machine.pressure_offset_codes * per_code,
         "pressure converter gain": machine.pressure_gain_codes * per_code,
         "pressure converter noise": machine.pressure_noise_codes * per_code,

@@ -24,7 +24,7 @@ from dzdesign.design.signal_text import (
     parse_signal,
     pressure_signal,
 )
-from dzdesign.design.signals import Signals
+from dzdesign.design.signals import PressureSignal, Signals
 from dzdesign.design.target_inputs import (
     LEAST_TRANSITION,
     LEAST_TRANSITION_NOISE,
@@ -49,6 +49,8 @@ class DesignOptions:
 
     law: str = "paper"
     signals: Signals = field(default_factory=Signals)
+    #: Of a third sensor, which `signals` get where the drop at negative commands needs it.
+    pressure_c: PressureSignal = field(default_factory=PressureSignal)
     #: None: as `signals` states it.
     negative_dp: NegativeDp | None = None
     guard: Guard = "closing"
@@ -83,6 +85,14 @@ class DesignOptions:
     #: Target and texts from which these options were read, to be kept in compensator.json.
     target: TargetInputs | None = None
     texts: Mapping[str, str] | None = None
+
+    def check_channels(self) -> None:
+        """Refuse declared channels of another number than the inputs."""
+        channels = self.target.channels if self.target else ()
+        supply = self.current is not None and self.current.sensor.supply_divider > 0
+        expected = 1 + len(self.signals.pressures) + (self.current.shunts if self.current else 0) + supply
+        if channels and len(channels) != expected:
+            raise InputError(f"--channels names {len(channels)} channels, expected {expected} of these inputs")
 
     def transition_codes(self) -> int:
         """Return the codes of the transition: the largest power of two within its share of the shorter command.
@@ -126,8 +136,6 @@ class DesignOptions:
         """Return the current control that is asked for, its loop chosen."""
         if self.current is None:
             return None
-        if len(self.signals.signs) == 2:
-            raise InputError("--drive current is for one solenoid, but the command has both signs; give --drive duty")
         dither = (self._dither_counts(), self._dither_ticks())
         return design_current_drive(self.current, self.signals.compare_max, dither)
 
@@ -204,7 +212,8 @@ def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
     sensors = []
     for name in ("pressure_a", "pressure_b"):
         text[name] = text[name] or live_zero_signal(converter)
-        sensors.append(pressure_signal(parse_signal(text[name], flag_of(name)), converter, span))
+    for name in ("pressure_a", "pressure_b", "pressure_c"):
+        sensors.append(pressure_signal(parse_signal(text[name] or text["pressure_a"], flag_of(name)), converter, span))
     signal = parse_signal(text["command_signal"], "--command-signal")
     command = command_signal(signal, converter, inverted=text["polarity"] == "inverted")
     signals = Signals(
@@ -225,14 +234,11 @@ def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
             )
     if text["hysteresis"] == "play" and read["transition"] == 0:
         raise InputError("--hysteresis play begins in the transition, but --transition is off; leave out one")
-    current = current_request(text, read, target)
-    if (channels := read["channels"]) and len(channels) != (
-        expected := 3 + bool(current) + bool(text["supply_signal"])
-    ):
-        raise InputError(f"--channels names {len(channels)} channels, expected {expected} of these inputs")
+    current = current_request(text, read, target, signals)
     return DesignOptions(
         **{name: read[name] for name in ("law", "negative_dp", "guard", "below_dp0", "above", "transition")},
         signals=signals,
+        pressure_c=sensors[2],
         command_error=command_error_of(text["command_error"], converter, command),
         ramp_up_s=read["ramp_up"],
         ramp_down_s=read["ramp_down"],
@@ -247,7 +253,7 @@ def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
         full_command_V=full_command_V(signal),
         accept=tuple(text["accept"].replace(",", " ").split()),
         current=current,
-        machine=machine_of(text, read, target, signals, current),
+        machine=machine_of(text, read, target, sensors, current),
         target=target,
         texts=text,
     )

@@ -178,7 +178,7 @@ def largest_gains(compensator: Compensator, lag_s: float, delay_s: float) -> tup
             if opens is None and closes is None:
                 continue
             knees = [knee / float(compensator.u_max_V) for knee in (opens, closes) if knee is not None]
-            law = corners_of(compensator, compensator.signals.code_at(test.dp_MPa), sign)
+            law = corners_of(compensator, compensator.signals.pair(sign).code_at(test.dp_MPa), sign)
             loop = Swinging(
                 lag_s=lag_s, delay_s=delay_s, sample_Hz=compensator.signals.sample_Hz, law=law,
                 opens=max(knees), closes=min(knees),

@@ -1,11 +1,12 @@
-"""The pressure inputs: which one is ahead at negative commands, what is said of them, and failures that they hide.
+"""The pressure inputs: which ones each side reads, what is said of them, and failures that they hide.
 
-The firmware has two pressure inputs, and their wires stay where they are. At positive commands A minus B is the
-pressure drop. At negative ones the same two sensors give A minus B or B minus A, and no other drop.
+The wires of the firmware's inputs stay where they are. Inputs A and B are the pressures that make the drop of positive
+commands, ahead and behind. Negative commands read any two inputs, such as B and A; a pressure that only their drop
+needs is input C.
 """
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, cast
 
 import numpy as np
 
@@ -14,68 +15,106 @@ from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.signal_text import live_zero_signal
-from dzdesign.design.signals import SIDE_NAMES, PressureSignal, Signals
+from dzdesign.design.signals import INPUT_NAMES, POSITIVE_PAIR, SIDE_NAMES, InputPair, Signals
 from dzdesign.design.target_inputs import Converter
 from dzdesign.identify.reading.metering_edge import TWO_SENSORS
 from dzdesign.identify.valve.model import ValveModel
-from dzdesign.identify.valve.recorded_drop import RecordedDrop
+from dzdesign.identify.valve.recorded_drop import DropQuantity, RecordedDrop
 
-#: What recordings of both sides say: the drop of negative commands is A minus B, B minus A, that of other ports than
-#: the two of positive commands, or nothing. A dP that is above zero on both sides may be a magnitude.
-Shown = Literal["same", "swapped", "other ports", "nothing"]
-IN_WORDS = {"same": "A minus B", "swapped": "B minus A"}
+#: What recordings show where they show no pair of inputs. A dP that is above zero on both sides may be a magnitude, and
+#: of any ports; a side whose recordings hold the drop of several pairs of ports has no two inputs.
+NoPair = Literal["nothing", "several"]
+NOTHING: NoPair = "nothing"
+SEVERAL: NoPair = "several"
 
 
-def shown_direction(valve: ValveModel) -> Shown:
-    """Return what the recordings show of the pressure drop at negative commands."""
+def shown_pair(valve: ValveModel) -> InputPair | NoPair:
+    """Return the inputs ahead and behind at negative commands that the recordings show."""
     positive, negative = (valve.sides[name].recorded_drop for name in ("positive", "negative"))
     if positive is None or negative is None:
-        return "nothing"
+        return NOTHING
     ways = positive.ways | negative.ways
-    if ways <= {("dP",), TWO_SENSORS}:
-        if negative.sign < 0:
-            return "swapped"
-        return "nothing" if ("dP",) in ways else "same"
-    # A drop that some recordings hold as such may be of any ports.
-    return "nothing" if ("dP",) in ways else "other ports"
+    if negative.sign < 0 and ways <= {("dP",), TWO_SENSORS}:
+        return "BA"
+    if ("dP",) in ways:
+        return NOTHING
+    ports = _ports(positive, negative)
+    if not ports:
+        return SEVERAL
+    names = [INPUT_NAMES[ports.index(port)] for port in negative.columns[0].quantities]
+    return cast(InputPair, "".join(names[:: negative.sign]))
 
 
-def with_negative_drop(valve: ValveModel, options: DesignOptions) -> DesignOptions:
-    """Return the options with the direction of the pressure drop at negative commands; refuse one that is not recorded.
+def _ports(positive: RecordedDrop, negative: RecordedDrop) -> list[DropQuantity]:
+    """Return the recorded ports in the order of the inputs; none if these are not three at most."""
+    if len(positive.ways) > 1 or len(negative.ways) > 1:
+        return []
+    ports = list(dict.fromkeys((*positive.columns[0].quantities, *negative.columns[0].quantities)))
+    return ports if len(ports) <= len(INPUT_NAMES) else []
+
+
+def with_pressure_inputs(valve: ValveModel, options: DesignOptions) -> DesignOptions:
+    """Return the options with the inputs of negative commands; refuse a pressure drop that is not the recorded one.
 
     Raises
     ------
     InputError
-        If no wiring of two pressure inputs gives the recorded drops, or the recordings contradict what is declared.
+        If no three pressure inputs give the recorded drops, or the recordings contradict what is declared.
     """
-    signals, shown = options.signals, shown_direction(valve)
-    declared = options.negative_dp or ("swapped" if signals.swapped else "same")
-    if declared == "wired":
-        return replace(options, signals=replace(signals, swapped=False))
-    positive, negative = (_recorded(valve, name) for name in ("positive", "negative"))
-    if shown == "other ports":
+    signals = options.signals
+    if len(signals.signs) == 1:
+        return _with_two(options, POSITIVE_PAIR)
+    shown, declared = shown_pair(valve), options.negative_dp or "-".join(signals.negative_pair)
+    if shown == SEVERAL and declared != "wired":
+        positive, negative = (_recorded(valve, name) for name in ("positive", "negative"))
         raise InputError(
             f"the pressure drop was recorded as {positive} at positive commands and as {negative} at negative ones. "
-            "No fixed wiring of the firmware's two pressure inputs gives both, and three are not supported. Design one "
-            "side alone, by a --command-signal of one sign, or give --negative-dp wired if the machine switches the "
-            "inputs"
+            "No three fixed pressure inputs give all of these. Design one side alone, by a --command-signal of one "
+            "sign, or give --negative-dp wired if the machine switches the inputs"
         )
-    if declared == "recorded":
-        return replace(options, signals=replace(signals, swapped=shown == "swapped"))
-    if shown not in (declared, "nothing"):
+    pair: InputPair = POSITIVE_PAIR
+    if declared == "recorded" and shown not in (NOTHING, SEVERAL):
+        pair = cast(InputPair, shown)
+    elif declared not in ("recorded", "wired"):
+        pair = cast(InputPair, declared.replace("-", ""))
+        if shown not in (pair, NOTHING):
+            raise InputError(
+                f"--negative-dp {declared} is {_minus(pair)}, but the recordings have {_recorded(valve, 'negative')} "
+                f"at negative commands, which is {_minus(shown)}; leave it out, or give --negative-dp wired if the "
+                "machine switches the inputs"
+            )
+    if "C" in pair:
+        third = signals.pressure_c or options.pressure_c
+        return replace(options, signals=replace(signals, negative_pair=pair, pressure_c=third))
+    return _with_two(options, pair)
+
+
+def _with_two(options: DesignOptions, pair: InputPair) -> DesignOptions:
+    """Return the options without a third sensor; refuse what is said of one."""
+    texts = options.texts or {}
+    if texts.get("pressure_c") or texts.get("pressure_error", "").count("/") > 1:
         raise InputError(
-            f"--negative-dp {declared} is {IN_WORDS[declared]}, but the recordings have {negative} at negative "
-            f"commands, which is {IN_WORDS[shown]}; leave it out, or give --negative-dp wired if the machine switches "
-            "the inputs"
+            f"--pressure-c, and a third --pressure-error, are for a third sensor, but the pressure drop is that of "
+            f"{' and '.join(pair)} at every command; leave it out, or say by --negative-dp whose drop it is: A-C"
         )
-    return replace(options, signals=replace(signals, swapped=declared == "swapped"))
+    machine = options.machine
+    if machine is not None:
+        left = {name: text for name, text in machine.defaults.items() if name != "pressure_error_c_MPa"}
+        machine = replace(machine, pressure_error_c_MPa=None, defaults=left)
+    signals = replace(options.signals, negative_pair=pair, pressure_c=None)
+    return replace(options, signals=signals, machine=machine)
+
+
+def _minus(pair: str) -> str:
+    return " minus ".join(pair)
 
 
 def wiring_in_words(compensator: Compensator) -> list[str]:
     """Say which recorded columns the pressure inputs are, and how the drop of negative commands comes of them."""
     lines = []
     if names := input_columns(compensator):
-        lines.append(f"pressure inputs: A = {names[0]}, B = {names[1]}, as recorded at positive commands")
+        inputs = ", ".join(f"{name} = {column}" for name, column in names.items())
+        lines.append(f"pressure inputs: {inputs}, as recorded{'' if 'C' in names else ' at positive commands'}")
     return lines + ([negative_drop_in_words(compensator)] if compensator.negative else [])
 
 
@@ -83,31 +122,54 @@ def negative_drop_in_words(compensator: Compensator) -> str:
     """Say how the pressure drop of negative commands comes of the inputs, and why; nothing for one sign."""
     if compensator.negative is None:
         return ""
-    drop = IN_WORDS["swapped" if compensator.signals.swapped else "same"]
+    drop = _minus(compensator.signals.negative_pair)
     recorded = _recorded(compensator.valve, "negative")
     return f"negative commands: the pressure drop is {drop}{_reason(compensator, recorded)}"
 
 
-def input_columns(compensator: Compensator) -> tuple[str, str] | None:
-    """Return the recorded columns that pressure inputs A and B stand for; None where no two columns were recorded."""
-    drop = compensator.valve.sides["positive"].recorded_drop
+def input_columns(compensator: Compensator) -> dict[str, str]:
+    """Return the recorded columns that the pressure inputs stand for, by name; none where no two were recorded."""
+    pair = compensator.signals.negative_pair
+    columns = dict(zip(POSITIVE_PAIR, _columns(compensator, "positive"), strict=False))
+    if columns and "C" in pair:
+        columns |= {
+            name: column
+            for name, column in zip(pair, _columns(compensator, "negative"), strict=False)
+            if name not in columns
+        }
+    return columns
+
+
+def _columns(compensator: Compensator, side: str) -> list[str]:
+    """Return the recorded columns that are ahead and behind on a side; none where no two make all of its drops."""
+    drop = compensator.valve.sides[side].recorded_drop
     if drop is None or len(drop.ways) != 1 or len(drop.columns[0].labels) != 2:
-        return None
-    of_each = zip(*(each.labels for each in drop.columns), strict=True)
-    ahead, behind = (" or ".join(dict.fromkeys(labels)) for labels in of_each)
-    return ahead, behind
+        return []
+    of_each = zip(*(each.labels[:: drop.sign] for each in drop.columns), strict=True)
+    return [" or ".join(dict.fromkeys(labels)) for labels in of_each]
 
 
 def is_wired(compensator: Compensator) -> bool:
     """Tell whether the machine is declared to switch the pressure inputs."""
-    return (compensator.options or {}).get("negative_dp") == "wired"
+    return (compensator.options or {}).get("negative_dp") == "wired" and compensator.negative is not None
+
+
+def what_machine_switches(compensator: Compensator) -> str:
+    """Say what every output must say of a machine that switches the pressure inputs; nothing of any other."""
+    if not is_wired(compensator):
+        return ""
+    columns = _columns(compensator, "negative")
+    there = f" {columns[0]} to input A and {columns[1]} to input B" if columns else ""
+    return (
+        f"The machine must switch the pressure inputs at negative commands:{there or ' the drop is A minus B then too'}"
+    )
 
 
 def _reason(compensator: Compensator, recorded: str) -> str:
     """Say what the direction rests on."""
     if is_wired(compensator):
         return f", which the machine must switch to the inputs (--negative-dp wired; recorded as {recorded})"
-    if shown_direction(compensator.valve) == "nothing":
+    if shown_pair(compensator.valve) == NOTHING:
         return f" by assumption: the recordings ({recorded}) do not show which sensor is ahead; see --negative-dp"
     return f", as recorded ({recorded})"
 
@@ -125,7 +187,7 @@ def not_covered(compensator: Compensator) -> tuple[str, ...]:
         return ("positive commands only: the negative side of this valve was identified and is not driven",)
     if is_wired(compensator):
         return ("at negative commands the machine must switch the pressure inputs",)
-    if shown_direction(compensator.valve) == "nothing":
+    if shown_pair(compensator.valve) == NOTHING:
         return ("at negative commands the direction of the pressure drop is declared and was not recorded",)
     return ()
 
@@ -138,7 +200,7 @@ def signals_in_words(compensator: Compensator) -> list[str]:
     if command.negative_full_code is not None:
         text += f", {command.negative_full_code} is {units.text(-u_max_V, 'g V')}"
     lines = [f"{text}; {_valid(command.valid_codes, signals.code_max, 'fault')}"]
-    for name, sensor in _sensors(signals).items():
+    for name, sensor in signals.pressures.items():
         lines.append(
             f"pressure {name}: ADC code {sensor.zero_code} is zero pressure, {sensor.full_code} is "
             f"{units.text(float(sensor.span_MPa), 'g MPa')}; "
@@ -159,17 +221,13 @@ def unseen_failures(signals: Signals) -> list[str]:
             f"a broken wire of the command that reads code 0 is taken for {'-' if sign < 0 else ''}{share:.0%} of "
             "command: have the wire supervised outside, or use a signal with a live zero"
         )
-    for name, sensor in _sensors(signals).items():
+    for name, sensor in signals.pressures.items():
         low, high = sensor.valid_codes
         unseen = ["a broken wire"] if low == 0 else []
         unseen += ["a reading above the span"] if high == signals.code_max else []
         if unseen:
             lines.append(f"of sensor {name} {' and '.join(unseen)} can't be told from a pressure")
     return lines
-
-
-def _sensors(signals: Signals) -> dict[str, PressureSignal]:
-    return {"A": signals.pressure_a, "B": signals.pressure_b}
 
 
 def _valid(codes: tuple[int, int], code_max: int, fault: str) -> str:
@@ -212,7 +270,8 @@ def hidden_failure(compensator: Compensator, sign: int) -> HiddenFailure | None:
     if model.trend not in ("increasing", "decreasing"):
         return None
     rising = model.trend == "increasing"
-    failures = compensator.signals.hidden_failures(sign, broken_code(compensator), reads_high=rising)
+    signals = compensator.signals
+    failures = signals.pair(sign).hidden_failures(signals.code_max, broken_code(compensator), reads_high=rising)
     if not failures:
         return None
     largest = max(side.beta) / compensator.beta_denominator

@@ -257,7 +257,7 @@ def hysteresis_left(made: Compensator, test: TestResult, sign: int = 1) -> np.nd
     """
     if test.recorded.rising is None or test.recorded.falling is None or test.dp_MPa is None:
         return np.zeros(0)
-    corners = corners_of(made, made.signals.code_at(test.dp_MPa), sign)
+    corners = corners_of(made, made.signals.pair(sign).code_at(test.dp_MPa), sign)
     functions, span = made.drive_functions, made.signals.command.span(sign)
     share = np.arange(span + 1) / span
     ends = ([0.0, corners.zero_band, corners.end, 1.0], [corners.offset, corners.offset, corners.at_end, corners.full])

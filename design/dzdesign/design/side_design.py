@@ -161,12 +161,13 @@ def opening_ceiling(
     Above the tests it comes down by as much as the guarded offset: a transition, and the hysteresis that a play takes
     out of it, stay as they are at the last test. Where the offset is released, only that height is left of it.
     """
-    signals, last = allowance.signals, allowance.signals.largest_difference(allowance.sign)
-    limit = offset_row(opening, signals, 0, last)
+    pair = allowance.pair
+    last = pair.largest_difference
+    limit = offset_row(opening, pair, 0, last)
     if guarded.above is not None and tested.stop <= last:
         let_go = min(released_from(above, tested) or last + 1, last + 1)
         height = opening.offset_V[-1] - guarded.offset_V[-1]
-        held = offset_row(guarded, signals, tested.stop, let_go - 1).line(Fraction(1), -height)
+        held = offset_row(guarded, pair, tested.stop, let_go - 1).line(Fraction(1), -height)
         left = ExactRow.joined([([height.numerator] * (last + 1 - let_go), height.denominator)])
         limit = limit[: tested.stop].followed_by(held).followed_by(left)
     return OffsetCeiling(limit=limit.line(1 / u_max), certified=tested)
@@ -192,7 +193,7 @@ def side_law(
     _refuse_no_offset(ceiling.limit[: tested.stop] if goes_on else ceiling.limit, options)
     top = (opening or certified).at(reference)
     if opening is None and options.machine:
-        top = left_by_machine(top, ceiling, signals, reference, u_max)
+        top = left_by_machine(top, ceiling, allowance, reference, u_max)
     u_min0 = offset_at_reference(top / u_max, signals, units.coefficient)
     above_one = side.trend == "increasing" or options.below_dp0 == "extend"
     table = partial(choose_beta_table, u_min0=u_min0, trend=side.trend, denominator=units.beta, above_one=above_one)
@@ -247,11 +248,11 @@ def travel(side: SideModel, u_max: Fraction, offset_V: Fraction) -> Fraction:
 
 
 def left_by_machine(
-    top_V: Fraction, ceiling: OffsetCeiling, signals: Signals, dp0_MPa: Fraction, u_max_V: Fraction
+    top_V: Fraction, ceiling: OffsetCeiling, allowance: Allowance, dp0_MPa: Fraction, u_max_V: Fraction
 ) -> Fraction:
     """Return the offset at dP0 that a declared machine leaves, V: a beta of 1 without a transition."""
-    limit = ceiling.limit[round(signals.dp_code(dp0_MPa))]
-    return min(top_V, (limit + Fraction(1, 2 * signals.compare_max)) * u_max_V)
+    limit = ceiling.limit[round(allowance.pair.dp_code(dp0_MPa))]
+    return min(top_V, (limit + Fraction(1, 2 * allowance.signals.compare_max)) * u_max_V)
 
 
 def over(value: Fraction, rounding: str, unit: int) -> Fraction:

@@ -23,6 +23,7 @@ Component = Literal[
     "bench pressure drop",
     "pressure sensor A",
     "pressure sensor B",
+    "pressure sensor C",
     "pressure converter offset",
     "pressure converter gain",
     "pressure converter noise",

@@ -16,7 +16,12 @@ from dzdesign.design.target_inputs import Count
 #: Side of the valve that each sign of command drives.
 SIDE_NAMES: Mapping[int, Literal["positive", "negative"]] = {1: "positive", -1: "negative"}
 CODE_LIMIT = 65535
-#: Sensors of unlike scaling are brought to sensor A's counts by an integer weight over this power of two.
+#: Pressure inputs, and a pair of them: the one ahead of a side's metering edge, then the one behind it.
+INPUT_NAMES = "ABC"
+InputPair = Literal["AB", "BA", "AC", "CA", "BC", "CB"]
+POSITIVE_PAIR: InputPair = "AB"
+#: A sensor behind of another scaling than the one ahead is brought to that one's counts by an integer weight over this
+#: power of two.
 WEIGHT_SHIFT = 12
 WEIGHT_UNIT = 1 << WEIGHT_SHIFT
 #: Differences of pressure codes fit 16 bits of the firmware, sign apart.
@@ -112,6 +117,86 @@ class PressureSignal:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class PressurePair:
+    """The two pressure inputs of one side; a difference is counted in codes of the sensor ahead."""
+
+    names: InputPair
+    ahead: PressureSignal
+    behind: PressureSignal
+
+    @property
+    def weight(self) -> int:
+        """Weight of a code behind over 2^`WEIGHT_SHIFT`, in codes ahead; exactly one for like sensors."""
+        return max(1, round(self.behind.per_code_MPa / self.ahead.per_code_MPa * WEIGHT_UNIT))
+
+    @property
+    def like_sensors(self) -> bool:
+        """True if both sensors count alike, so that the firmware needs no weight."""
+        return self.weight == WEIGHT_UNIT
+
+    def difference(self, ahead_code: int, behind_code: int) -> int:
+        """Return the difference of two pressure codes, as the firmware counts it."""
+        ahead, behind = ahead_code - self.ahead.zero_code, behind_code - self.behind.zero_code
+        return ahead * WEIGHT_UNIT - behind * self.weight >> WEIGHT_SHIFT
+
+    def hidden_failures(self, code_max: int, broken_code: int = 0, *, reads_high: bool) -> tuple[str, ...]:
+        """Return the failures of a sensor that make the pressure difference read too high, or too low, by valid codes.
+
+        A broken wire reads up to `broken_code`: what the converter makes of no voltage. Of the sensor ahead that is a
+        drop of nothing while the pressure behind is next to none: a valve that is open to tank. A sensor behind that
+        reads its converter's top makes a negative difference, which is a failure by itself, unless the one ahead spans
+        more.
+        """
+        sensors = dict(zip(self.names, (self.ahead, self.behind), strict=True))
+        ahead, behind = self.names
+        broken, above = (behind, ahead) if reads_high else (ahead, behind)
+        found = []
+        if sensors[broken].valid_codes[0] <= broken_code:
+            found.append(f"a broken wire of sensor {broken}")
+        positive = reads_high or self.difference(self.ahead.full_code, code_max) > 0
+        if positive and sensors[above].valid_codes[1] == code_max:
+            found.append(f"a reading of sensor {above} above its span")
+        return tuple(found)
+
+    @property
+    def largest_difference(self) -> int:
+        """The largest difference that sound codes make."""
+        return max(self.difference(self.ahead.valid_codes[1], self.behind.valid_codes[0]), 1)
+
+    def difference_error(self, code_max: int, half_width_MPa: Fraction = Fraction(0)) -> tuple[int, int]:
+        """Return how many codes a difference may read too high (as a negative number) and too low, rounded outwards.
+
+        That is rounding to codes, and a half-width of the pressure drop beside it: what the sensors and their
+        converters, and those of the bench, may be off.
+        """
+        ahead, behind = self.ahead, self.behind
+        low, high = ahead.error_MPa[0] - behind.error_MPa[1], ahead.error_MPa[1] - behind.error_MPa[0]
+        # What the weight is off, at the sensor's largest code, and the shift that rounds down.
+        unlike = abs(behind.per_code_MPa - ahead.per_code_MPa * self.weight / WEIGHT_UNIT) * code_max
+        shift = 0 if self.like_sensors else ahead.per_code_MPa
+        unlike += half_width_MPa
+        return floor((low - unlike) / ahead.per_code_MPa), ceil((high + unlike + shift) / ahead.per_code_MPa)
+
+    def dp_MPa(self, dp_code: int) -> Fraction:
+        """Return the pressure drop that a difference of pressure codes stands for, exactly."""
+        dp_MPa: Fraction = pressure_drop(dp_code, span=self.ahead.span_MPa, code_max=self._span_codes)
+        return dp_MPa
+
+    def dp_code(self, dp_MPa: Fraction) -> Fraction:
+        """Return the difference of pressure codes that a pressure drop makes, exactly (not rounded)."""
+        code: Fraction = pressure_drop_code(dp_MPa, span=self.ahead.span_MPa, code_max=self._span_codes)
+        return code
+
+    def code_at(self, dp_MPa: float | None) -> int:
+        """Return the difference of pressure codes that is nearest to a pressure drop of valve.json."""
+        return round(self.dp_code(Fraction(repr(dp_MPa))))
+
+    @property
+    def _span_codes(self) -> int:
+        return self.ahead.full_code - self.ahead.zero_code
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Signals:
     """Exact scalings of a compensator's inputs and output."""
 
@@ -129,8 +214,10 @@ class Signals:
     """Scaling of the sensor upstream of the metering edge, for positive command."""
     pressure_b: PressureSignal = field(default_factory=PressureSignal)
     """Scaling of the sensor downstream of the metering edge, for positive command."""
-    swapped: bool = False
-    """Whether the pressure drop at negative commands is B minus A."""
+    pressure_c: PressureSignal | None = None
+    """Scaling of the third sensor, which only negative commands use; null without one."""
+    negative_pair: InputPair = "AB"
+    """Sensors upstream and downstream of the metering edge, in this order, for negative command."""
 
     def __post_init__(self) -> None:
         if self.tick_Hz % self.sample_Hz:
@@ -138,15 +225,25 @@ class Signals:
                 f"tick_Hz is {self.tick_Hz} and sample_Hz {self.sample_Hz}, "
                 "expected a whole number of PWM periods a sample"
             )
-        for name in ("command", "pressure_a", "pressure_b"):
-            low, high = getattr(self, name).valid_codes
+        if (self.pressure_c is not None) != ("C" in self.negative_pair) or (self.pressure_c and len(self.signs) == 1):
+            raise RuleError(
+                f"the pressure drop at negative commands is that of {' and '.join(self.negative_pair)}, expected a "
+                "pressure_c where C is one of them in a command of both signs, and nowhere else"
+            )
+        valid = {"command": self.command.valid_codes}
+        valid |= {f"pressure_{name.lower()}": sensor.valid_codes for name, sensor in self.pressures.items()}
+        for name, (low, high) in valid.items():
             if not 0 <= low < high <= self.code_max:
                 raise RuleError(f"{name}: valid codes {low} to {high} are outside the converter's 0 to {self.code_max}")
-        # Either way round: a failed sensor makes any difference of sound codes.
-        a, b = self.pressure_a.valid_codes, self.pressure_b.valid_codes
-        if max(self.difference(a[1], b[0]), -self.difference(a[0], b[1])) > LARGEST_DIFFERENCE:
+        for sign in self.signs:
+            self._check_spans(self.pair(sign))
+
+    def _check_spans(self, pair: PressurePair) -> None:
+        """Refuse a pair whose differences leave 16 bits; either way round: a failed sensor makes any of sound codes."""
+        ahead, behind = pair.ahead.valid_codes, pair.behind.valid_codes
+        if max(pair.difference(ahead[1], behind[0]), -pair.difference(ahead[0], behind[1])) > LARGEST_DIFFERENCE:
             raise RuleError(
-                f"the sensors' spans of {float(self.pressure_a.span_MPa):g} and {float(self.pressure_b.span_MPa):g} "
+                f"the sensors' spans of {float(pair.ahead.span_MPa):g} and {float(pair.behind.span_MPa):g} "
                 "MPa are too unlike; choose sensors within a factor of seven"
             )
 
@@ -156,77 +253,13 @@ class Signals:
         return (1,) if self.command.negative_full_code is None else (1, -1)
 
     @property
-    def weight_b(self) -> int:
-        """Weight of sensor B's codes over 2^`WEIGHT_SHIFT`, in codes of sensor A; exactly one for like sensors."""
-        return max(1, round(self.pressure_b.per_code_MPa / self.pressure_a.per_code_MPa * WEIGHT_UNIT))
+    def pressures(self) -> Mapping[str, PressureSignal]:
+        """The sensors that are there, by the names of their inputs, in the order of these."""
+        third = {} if self.pressure_c is None else {"C": self.pressure_c}
+        return {"A": self.pressure_a, "B": self.pressure_b, **third}
 
-    @property
-    def like_sensors(self) -> bool:
-        """True if both sensors count alike, so that the firmware needs no weight."""
-        return self.weight_b == WEIGHT_UNIT
-
-    def difference(self, p_a_code: int, p_b_code: int, sign: int = 1) -> int:
-        """Return the difference of two pressure codes, in codes of sensor A, as the firmware counts it."""
-        a, b = p_a_code - self.pressure_a.zero_code, p_b_code - self.pressure_b.zero_code
-        turn = -1 if sign < 0 and self.swapped else 1
-        return turn * (a * WEIGHT_UNIT - b * self.weight_b) >> WEIGHT_SHIFT
-
-    def hidden_failures(self, sign: int, broken_code: int = 0, *, reads_high: bool) -> tuple[str, ...]:
-        """Return the failures of a sensor that make the pressure difference read too high, or too low, by valid codes.
-
-        A broken wire reads up to `broken_code`: what the converter makes of no voltage. Of the sensor ahead that is a
-        drop of nothing while the pressure behind is next to none: a valve that is open to tank. A sensor behind that
-        reads its converter's top makes a negative difference, which is a failure by itself, unless the one ahead spans
-        more.
-        """
-        sensors = {"A": self.pressure_a, "B": self.pressure_b}
-        ahead, behind = ("B", "A") if sign < 0 and self.swapped else ("A", "B")
-        broken, above = (behind, ahead) if reads_high else (ahead, behind)
-        full = {ahead: sensors[ahead].full_code, behind: self.code_max}
-        found = []
-        if sensors[broken].valid_codes[0] <= broken_code:
-            found.append(f"a broken wire of sensor {broken}")
-        positive = reads_high or self.difference(full["A"], full["B"], sign) > 0
-        if positive and sensors[above].valid_codes[1] == self.code_max:
-            found.append(f"a reading of sensor {above} above its span")
-        return tuple(found)
-
-    def largest_difference(self, sign: int) -> int:
-        """Return the largest difference that sound codes make."""
-        a, b = self.pressure_a.valid_codes, self.pressure_b.valid_codes
-        reversed_ = sign < 0 and self.swapped
-        return max(self.difference(a[0], b[1], sign) if reversed_ else self.difference(a[1], b[0], sign), 1)
-
-    def difference_error(self, sign: int, half_width_MPa: Fraction = Fraction(0)) -> tuple[int, int]:
-        """Return how many codes a difference may read too high (as a negative number) and too low, rounded outwards.
-
-        That is rounding to codes, and a half-width of the pressure drop beside it: what the sensors and their
-        converters, and those of the bench, may be off.
-        """
-        a, b = self.pressure_a, self.pressure_b
-        low, high = a.error_MPa[0] - b.error_MPa[1], a.error_MPa[1] - b.error_MPa[0]
-        # What the weight is off, at the sensor's largest code, and the shift that rounds down.
-        unlike = abs(b.per_code_MPa - a.per_code_MPa * self.weight_b / WEIGHT_UNIT) * self.code_max
-        if sign < 0 and self.swapped:
-            low, high = -high, -low
-        shift = 0 if self.like_sensors else a.per_code_MPa
-        unlike += half_width_MPa
-        return floor((low - unlike) / a.per_code_MPa), ceil((high + unlike + shift) / a.per_code_MPa)
-
-    def dp_MPa(self, dp_code: int) -> Fraction:
-        """Return the pressure drop that a difference of pressure codes stands for, exactly."""
-        dp_MPa: Fraction = pressure_drop(dp_code, span=self.pressure_a.span_MPa, code_max=self._span_codes)
-        return dp_MPa
-
-    def dp_code(self, dp_MPa: Fraction) -> Fraction:
-        """Return the difference of pressure codes that a pressure drop makes, exactly (not rounded)."""
-        code: Fraction = pressure_drop_code(dp_MPa, span=self.pressure_a.span_MPa, code_max=self._span_codes)
-        return code
-
-    def code_at(self, dp_MPa: float | None) -> int:
-        """Return the difference of pressure codes that is nearest to a pressure drop of valve.json."""
-        return round(self.dp_code(Fraction(repr(dp_MPa))))
-
-    @property
-    def _span_codes(self) -> int:
-        return self.pressure_a.full_code - self.pressure_a.zero_code
+    def pair(self, sign: int) -> PressurePair:
+        """Return the pressure inputs of one sign of command."""
+        names = POSITIVE_PAIR if sign > 0 else self.negative_pair
+        ahead, behind = (self.pressures[name] for name in names)
+        return PressurePair(names=names, ahead=ahead, behind=behind)

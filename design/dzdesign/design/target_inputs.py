@@ -88,8 +88,8 @@ class TargetInputs:
     crystal_Hz: Annotated[int, quantity("Hz", ge=1, le=10**9)] | None = None
     """Declared frequency of the board's crystal or oscillator; null if none is declared."""
     channels: tuple[str, ...] = ()
-    """Declared channels of the converter, such as A0, for command, pressure A, pressure B, current and supply; empty if
-    none are declared."""
+    """Declared channels of the converter, such as A0, for command, pressures, current and supply, as far as each is
+    there; empty if none are declared."""
 
     def __post_init__(self) -> None:
         if self.current_sampling and self.current_sampling.tick_Hz != self.tick_Hz:

@@ -119,7 +119,7 @@ def _figures(own: Compensator, sign: int, lot_law: Compensator | None) -> dict[s
     test = min(side.tests, key=lambda test: abs((test.dp_MPa or 0.0) - (side.reference.dp_MPa or 0.0)))
     left = {branch: round(100 * max(values), 5) for branch, values in _remaining(own, own, sign).items()}
     curve = side.certified[own.side(sign).certificate.guard]
-    code = own.signals.code_at(side.reference.dp_MPa)
+    code = own.signals.pair(sign).code_at(side.reference.dp_MPa)
     values = (
         side.reference.dp_MPa, test.u_knee_rising_V, test.u_knee_falling_V, test.u_knee_se_V,
         curve.u_lower_V[side.tests.index(test)],

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from dzdesign.identify.valve.model import ValveModel
 
 #: Options that only a command of both signs has a use for.
-OF_BOTH_SIGNS = ("negative_dp",)
+OF_BOTH_SIGNS = ("negative_dp", "pressure_c")
 
 
 @dataclass(frozen=True)

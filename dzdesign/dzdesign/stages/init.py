@@ -113,12 +113,12 @@ def propose(arguments: "InitArguments") -> Proposal:
 
 def _negative_drop(valve: "ValveModel | None") -> dict[str, str]:
     """Return what the recordings show of the pressure drop at negative commands; nothing of one side."""
-    from dzdesign.design.pressure_inputs import shown_direction
+    from dzdesign.design.pressure_inputs import shown_pair
 
     if valve is None or len(valve.sides) < 2:
         return {}
     drop = valve.sides["negative"].recorded_drop
-    return {"shown": shown_direction(valve), "recorded": drop.in_words() if drop else "not recorded"}
+    return {"shown": shown_pair(valve), "recorded": drop.in_words() if drop else "not recorded"}
 
 
 def _found_recordings() -> list[Path]:

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
         CalibrationReading,
         DriveReading,
         NodeReading,
-        SensorReading,
         SideReading,
     )
     from dzdesign.codegen.other_targets import Output
@@ -143,8 +142,7 @@ def _put_signals(console: "Console", reading: "CalibrationReading", units: "Reco
         f"Command: zero at code {command.zero_code}, {codes}, {units.text(reading.u_max_V, 'g V')}; "
         f"valid {_range(command.valid_codes)}",
     )
-    sensors: dict[str, SensorReading] = {"A": reading.pressure_a, "B": reading.pressure_b}
-    for name, sensor in sensors.items():
+    for name, sensor in reading.pressures.items():
         put_line(
             console,
             f"Pressure {name}: 0 at code {sensor.zero_code}, {units.text(sensor.span_MPa, '.4g MPa')} at code "

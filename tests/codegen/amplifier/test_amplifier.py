@@ -102,7 +102,7 @@ def test_a_table_is_the_law_beyond_the_transition_and_rises(designs):
         compensator = designs[name]
         setting = amplifier_setting(compensator, device_named(device))
         at = compensator.valve.sides["positive"].reference.dp_MPa
-        dp_code = round(compensator.signals.dp_code(Fraction(repr(at))))
+        dp_code = round(compensator.signals.pair(1).dp_code(Fraction(repr(at))))
         command = compensator.signals.command
         limit = Fraction(compensator.drive_functions.compare_limit, compensator.signals.compare_max)
         for sign, characteristic in setting.characteristics.items():

@@ -31,7 +31,7 @@ from tests.support.synthetic import needs_compiler
 
 def core_of_everything():
     """The files of a core in block form for two solenoids, swapped pressures, current control and a measured supply."""
-    built = replace(built_for(variant("bipolar, all options")), shape=0b11101, samples=PLAIN.samples)
+    built = replace(built_for(variant("bipolar, all options")), shape=0b11010101, samples=PLAIN.samples)
     return texts(block_core_files(built))
 
 
@@ -102,7 +102,7 @@ def test_the_block_as_c_is_the_block_as_octets(tmp_path):
 @pytest.mark.parametrize("loop", [PLAIN, replace(PLAIN, supply=SUPPLY)], ids=["supply unknown", "supply measured"])
 def test_the_current_controller_is_the_exact_one_in_every_state(loop, tmp_path):
     compensator = variant("default")
-    built = replace(built_for(compensator), shape=8 + 16 * bool(loop.supply), samples=loop.samples)
+    built = replace(built_for(compensator), shape=64 + 128 * bool(loop.supply), samples=loop.samples)
     block = replace(block_of(compensator, "0" * 64), shape=built.shape, current=current_block(loop))
     (tmp_path / "core").mkdir()
     for name, text in texts(block_core_files(built)).items():

@@ -108,7 +108,7 @@ def test_what_is_no_block_is_refused(block, damage, named):
 
 def test_what_a_block_has_no_room_for_is_refused():
     compensator = variant("default")
-    nodes = (100,) * (compensator.signals.largest_difference(1) // 16 + 2)
+    nodes = (100,) * (compensator.signals.pair(1).largest_difference // 16 + 2)
     positive = replace(compensator.positive, beta=nodes, transition_beta=nodes)
     many = replace(compensator, beta_step_codes=16, sides=replace(compensator.sides, positive=positive))
     for refused, texts_given, named in (
@@ -129,8 +129,9 @@ def test_a_number_that_does_not_fit_is_no_block(block):
 def test_unlike_sensors_and_sides_stand_in_the_block(block):
     compensator = variant("bipolar, all options")
     signals = compensator.signals
-    assert block.weight_b == signals.weight_b != 4096 and block.shape == 0b101
+    assert block.shape == 0b10101
     for place, sign in enumerate(signals.signs):
+        assert block.sides[place].weight == signals.pair(sign).weight != 4096
         side, law, zero = block.sides[place], compensator.side(sign).law_beta, compensator.side(sign).beta
         unit = Fraction(1, side.beta_unit)
         for node, (of_law, at_zero) in enumerate(zip(law, zero, strict=True)):
@@ -246,7 +247,19 @@ def block_named(name: str) -> CalibrationBlock:
     return block_of(variant(name), DIGEST, serial="V-7 №3", record="lot 12")
 
 
-@pytest.mark.parametrize("name", ["default", "target law, no transition", "bipolar, all options", "bipolar, play"])
+#: What a block says of the pressure inputs of negative commands.
+SAID_OF = {
+    "AB": (),
+    "BA": (
+        "pressure B is ahead at negative commands, and not A", "pressure A is behind at negative commands, and not B"
+    ),
+    "AC": ("pressure C is behind at negative commands, and not B",),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "name", ["default", "target law, no transition", "bipolar, all options", "bipolar, play", "three pressures"]
+)
 def test_the_reading_is_what_the_compensator_says(name):
     compensator, block = variant(name), block_named(name)
     signals, functions = compensator.signals, compensator.drive_functions
@@ -254,10 +267,10 @@ def test_the_reading_is_what_the_compensator_says(name):
     full = float(compensator.u_max_V)
     assert (reading.serial, reading.record, reading.compensator_sha256) == ("V-7 №3", "lot 12", DIGEST)
     assert reading.u_max_V == full and reading.shape == (
-        (*("two solenoids: a command of both signs",), *(("the pressure drop of negative commands is B less A",)
-        if signals.swapped else ())) if compensator.negative else ()
-    )  # fmt: skip
-    for found, sensor in ((reading.pressure_a, signals.pressure_a), (reading.pressure_b, signals.pressure_b)):
+        ("two solenoids: a command of both signs", *SAID_OF[signals.negative_pair]) if compensator.negative else ()
+    )
+    assert list(reading.pressures) == list(signals.pressures)
+    for found, sensor in zip(reading.pressures.values(), signals.pressures.values(), strict=True):
         assert found.span_MPa == float(sensor.span_MPa) and found.valid_codes == sensor.valid_codes
         assert (found.zero_code, found.full_code) == (sensor.zero_code, sensor.full_code)
     assert reading.command.codes == {side: signals.command.span(sign) for side, sign in _sides(compensator)}
@@ -285,7 +298,9 @@ def test_the_law_at_the_nodes_is_the_exact_one(name):
     counts = compensator.signals.compare_max / float(compensator.u_max_V)
     for place, (side, sign) in enumerate(_sides(compensator)):
         law, nodes = ExactLaw(compensator, sign), reading.sides[side].nodes
-        assert nodes[-1].dp_MPa == pytest.approx(law.a.per_code_MPa * compensator.beta_step_codes * (len(nodes) - 1))
+        assert nodes[-1].dp_MPa == pytest.approx(
+            law.ahead.per_code_MPa * compensator.beta_step_codes * (len(nodes) - 1)
+        )
         for number, node in enumerate(nodes):
             betas = law.betas(number * compensator.beta_step_codes)
             assert (node.beta, node.beta_at_zero) == pytest.approx((float(betas.law), float(betas.zero)), rel=1e-9)
@@ -296,7 +311,7 @@ def test_the_law_at_the_nodes_is_the_exact_one(name):
             assert round(node.offset_V * counts) == law.compare_value(law.zero, corners)
             assert round(node.full_V * counts) == law.compare_value(law.full, corners)
         tested = float(compensator.side(sign).certificate.dp_MPa[1])
-        assert 0 <= tested - reading.sides[side].tested_to_MPa < law.a.per_code_MPa
+        assert 0 <= tested - reading.sides[side].tested_to_MPa < law.ahead.per_code_MPa
 
 
 def _sides(compensator):
@@ -306,14 +321,12 @@ def _sides(compensator):
 @pytest.mark.parametrize(
     ("change", "named"),
     [
-        ({"shape": 1 << 5}, "shape"),
+        ({"shape": 1 << 9}, "shape"),
         ({"sample_Hz": 0}, "rates"),
         ({"compare_max": 0}, "rates"),
         ({"beta_step": 0}, "step of beta"),
         ({"beta_step": 48}, "step of beta"),
-        ({"a_full": 0}, "span"),
         ({"reserved": 1}, "FORMAT"),
-        ({"weight_b": 0}, "SIGNALS"),
         ({"compare_limit": 65535}, "LAW"),
         ({"dither_ticks": 0}, "DRIVE"),
     ],
@@ -322,6 +335,17 @@ def test_numbers_that_no_firmware_accepts_are_refused(change, named):
     block = unpack(pack(replace(block_named("default"), **change)))
     with pytest.raises(InputError, match=r"^valve\.bin: the CRC-32 is right") as refused:
         reading_of(block, "valve.bin")
+    assert named in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("part", "change", "named"), [("sensors", {"full": 0}, "span"), ("sides", {"weight": 0}, "SIGNALS")]
+)
+def test_numbers_of_a_sensor_or_a_side_that_no_firmware_accepts_are_refused(part, change, named):
+    block = block_named("default")
+    first, *others = getattr(block, part)
+    with pytest.raises(InputError) as refused:
+        reading_of(replace(block, **{part: (replace(first, **change), *others)}), "valve.bin")
     assert named in str(refused.value)
 
 

@@ -30,7 +30,7 @@ pytestmark = needs_compiler
 def with_current(compensator):
     """A firmware and block with current control and the supply measured, beside what the compensator has."""
     loop = replace(PLAIN, supply=SUPPLY)
-    built = replace(built_for(compensator), shape=0b11000, samples=loop.samples)
+    built = replace(built_for(compensator), shape=0b11000000, samples=loop.samples)
     block = replace(block_of(compensator, "0" * 64), shape=built.shape, current=current_block(loop))
     return built, block
 

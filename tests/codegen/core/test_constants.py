@@ -10,7 +10,7 @@ from tests.support.core_variants import NAMES, firmware, variant
 
 COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 #: A `#define`, or a member of the valve's numbers, of an array its first line; and the comment before it.
-NUMBER = re.compile(r"^#define (\w+)[ \t]+(\S.*)$|^ *\.(?!sides|current)(\w+) = (.+?),?$", re.MULTILINE)
+NUMBER = re.compile(r"^#define (\w+)[ \t]+(\S.*)$|^ *\.(?!sensors|sides|current)(\w+) = (.+?),?$", re.MULTILINE)
 BEFORE = re.compile(r"/\*((?:(?!\*/).)*)\*/\s*\Z", re.DOTALL)
 VALVE = "core/dz_valve.h"
 #: Widths of 64-, 32- and 16-bit words, their masks and top bits; none is a datum.
@@ -76,7 +76,7 @@ def test_a_datum_is_the_numbers_value():
     signals, functions = document["signals"], document["drive_functions"]
     assert {
         ("command_zero", f"{signals['command']['zero_code']}u"),
-        ("b_high", f"{signals['pressure_b']['valid_codes'][1]}u"),
+        ("high", f"{signals['pressure_b']['valid_codes'][1]}u"),
         ("compare_limit", f"{functions['compare_limit']}u"),
         ("dither_counts", f"{functions['dither_counts']}u"),
     } <= set(values)

@@ -15,7 +15,7 @@ from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.side_law import Sides
-from dzdesign.design.signal_text import command_signal, parse_signal
+from dzdesign.design.signal_text import command_signal, parse_signal, pressure_signal
 from dzdesign.design.target_inputs import CommandError, Converter
 from dzdesign.verify.exhaustive.drive_check import drive_samples as sequence
 from dzdesign.verify.exhaustive.exact_drive import STEP_UNIT, DriveModel
@@ -26,10 +26,9 @@ from tests.support.synthetic import needs_compiler
 pytestmark = needs_compiler
 
 
-class Drive(ctypes.Structure):
-    """`struct dz_drive`."""
-
-    _fields_ = [
+def drive_type(pairs: int) -> type[ctypes.Structure]:
+    """Return `struct dz_drive` with so many pairs of pressures, each remembered by itself."""
+    fields = [
         *((name, ctypes.c_uint16) for name in ("compare_a", "compare_b", "status", "law")),
         ("side", ctypes.c_int16),
         ("ticks", ctypes.c_uint16),
@@ -37,8 +36,13 @@ class Drive(ctypes.Structure):
         ("rising", ctypes.c_uint16),
         ("played", ctypes.c_int16),
         ("ramped", ctypes.c_int32),
-        *((f"{kind}_{of}", ctypes.c_uint16) for kind in ("valid", "faulty") for of in ("commands", "pressures")),
+        *(
+            (f"{kind}_{of}", ctypes.c_uint16)
+            for kind in ("valid", "faulty")
+            for of in ("commands", "pressures", *(["other_pressures"] if pairs == 2 else []))
+        ),
     ]
+    return type("Drive", (ctypes.Structure,), {"_fields_": fields})
 
 
 class Firmware:
@@ -49,7 +53,7 @@ class Firmware:
         sources = {path.removeprefix("core/"): text for path, text in files.items() if path.startswith("core/")}
         sources["dz_drive.c"] = edit(sources["dz_drive.c"])
         self._library = load_library(sources, "the drive")
-        self.state = Drive()
+        self.state = drive_type(len(compensator.signals.pressures) - 1)()
         self._library.dz_drive_init(ctypes.byref(self.state))
 
     def sample(self, *codes: int) -> None:
@@ -76,14 +80,14 @@ def option_sets() -> dict[str, DesignOptions]:
     watched = full_options()
     full = replace(watched, **FOLLOWS_AT_ONCE)
     plain = DesignOptions(
-        signals=replace(full.signals, command=DesignOptions().signals.command, swapped=False), **FOLLOWS_AT_ONCE
+        signals=replace(full.signals, command=DesignOptions().signals.command, negative_pair="AB"), **FOLLOWS_AT_ONCE
     )
     return {
         "everything": full,
         "two solenoids alone": DesignOptions(signals=full.signals, **FOLLOWS_AT_ONCE),
         "turned, same pressures": replace(
             full,
-            signals=replace(full.signals, command=turned("-10..10 V x 0.15 + 1.5 V"), swapped=False),
+            signals=replace(full.signals, command=turned("-10..10 V x 0.15 + 1.5 V"), negative_pair="AB"),
             negative_dp="wired",
         ),
         "one solenoid alone": plain,
@@ -108,7 +112,18 @@ def option_sets() -> dict[str, DesignOptions]:
         "one solenoid, interlock": replace(plain, fault_samples=5, interlock=True),
         "one solenoid, no transition, latch": replace(plain, transition=Fraction(0), fault_samples=4, fault_latch=True),
         "everything, watched": watched,
+        "three pressures": three(full, "AC"),
+        "three pressures, watched": three(watched, "AC"),
+        "three pressures, play": replace(three(full, "CB"), dither_Hz=0.0, dither_peak=Fraction(0), play=True),
+        "three pressures, latch": three(replace(watched, fault_samples=3, fault_latch=True), "BC"),
+        "three pressures, C ahead of A": three(watched, "CA"),
     }
+
+
+def three(options: DesignOptions, pair: str) -> DesignOptions:
+    """Return the options with a third sensor, unlike the others, and these inputs at negative commands."""
+    third = pressure_signal(parse_signal("0.5..2.5 V = 30 MPa", "--pressure-c"), Converter(), Fraction(20))
+    return replace(options, signals=replace(options.signals, negative_pair=pair, pressure_c=third))
 
 
 SETS = option_sets()
@@ -116,10 +131,14 @@ SETS = option_sets()
 
 @cache
 def compensator_named(name: str) -> Compensator:
-    return design(golden_valve(FULL), SETS[name])
+    valve = golden_valve(FULL)
+    if name.startswith("three"):  # of recordings that show no direction
+        sides = {side: replace(model, recorded_drop=None) for side, model in valve.sides.items()}
+        valve = replace(valve, sides=sides)
+    return design(valve, SETS[name])
 
 
-def first_difference(firmware, model: DriveModel, samples: list[tuple[int, int, int]]) -> str:
+def first_difference(firmware, model: DriveModel, samples: list[tuple[int, ...]]) -> str:
     """Run both, two ticks a sample; the first tick where they differ in words, or nothing."""
     for number, codes in enumerate(samples):
         firmware.sample(*codes)
@@ -173,8 +192,18 @@ FAULTS = [
     ("if (compare == 0u)", "if (compare == 1u)", ONE_SIDE),
     ("compare -= block->dither_counts;", ";", ONE_SIDE),
     ("to & ~is_negative(to)", "to", "everything"),
-    ("negative(past, p_a_adc, p_b_adc, held)", "negative(past, p_a_adc, p_b_adc, 0u)", "everything"),
+    ("negative(past, p_b_adc, p_a_adc, held)", "negative(past, p_b_adc, p_a_adc, 0u)", "everything"),
     ("dz_status_negative(", "dz_status(", "everything"),
+    ("negative(past, p_b_adc, p_a_adc, held)", "negative(past, p_a_adc, p_b_adc, held)", "everything"),
+    # Pressures of the other side, or in each other's place; and what is remembered of them.
+    ("negative(past, p_a_adc, p_c_adc, held)", "negative(past, p_a_adc, p_b_adc, held)", "three pressures"),
+    ("negative(past, p_a_adc, p_c_adc, held)", "negative(past, p_c_adc, p_a_adc, held)", "three pressures"),
+    ("(past, p_a_adc, p_b_adc, held)", "(past, p_a_adc, p_c_adc, held)", "three pressures"),
+    ("status_negative(u_adc, p_a_adc, p_c_adc)", "status_negative(u_adc, p_a_adc, p_b_adc)", "three pressures"),
+    ("        status = sensed_negative;\n", "", "three pressures"),
+    ("        others = sensed;\n", "", "three pressures"),
+    ("    others &= ", "    others |= ", "three pressures, watched"),
+    ("    status |= others;\n", "", "three pressures"),
     ("(uint32_t)towards - block->zero_band", "(uint32_t)towards", ONE_SIDE),
 ]
 
@@ -307,7 +336,7 @@ def test_what_the_firmwares_integers_cannot_hold_is_refused(wording):
         replace(plain.signals, sample_Hz=1200)
     signals = replace(plain.signals, code_max=65535, command=replace(plain.signals.command, valid_codes=(0, 65535)))
     functions = replace(plain.drive_functions, ramp_up=(1, 0))
-    nodes = (32768,) * (signals.largest_difference(1) // plain.beta_step_codes + 2)
+    nodes = (32768,) * (signals.pair(1).largest_difference // plain.beta_step_codes + 2)
     with wording.refusal(InputError):
         sides = Sides(positive=replace(plain.positive, beta=nodes, transition_beta=nodes))
         replace(plain, signals=signals, drive_functions=functions, sides=sides)

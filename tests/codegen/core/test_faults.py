@@ -16,6 +16,7 @@ from dzdesign.verify.exhaustive.drive_check import (
     PreparedDrive,
 )
 from tests.codegen.core.test_drive import Firmware, compensator_named
+from tests.support.core_variants import variant
 from tests.support.golden_firmware import GOLDENS, golden_compensator
 from tests.support.synthetic import needs_compiler
 
@@ -40,7 +41,7 @@ def started(*options) -> Firmware:
     return firmware
 
 
-def give(firmware: Firmware, command: int, pressures: tuple[int, int], count: int = 1) -> list[tuple[int, int]]:
+def give(firmware: Firmware, command: int, pressures: tuple[int, ...], count: int = 1) -> list[tuple[int, int]]:
     """Give so many samples; the compare value and the status after each."""
     found = []
     for _ in range(count):
@@ -172,7 +173,7 @@ SEEDED = {
     "pressure B's bit is no fault": (
         "DZ_STATUS_PRESSURE_B | ", ""),
     "an implausible difference is no fault": (
-        " | DZ_STATUS_DIFFERENCE);", ");"),
+        " | DZ_STATUS_DIFFERENCE));", "));"),
     "the law takes the pressures again": (
         "p_b_adc, held)", "p_b_adc, all_ones(status & 14u))"),
     "the status is silent": (
@@ -206,6 +207,75 @@ def test_a_seeded_fault_is_found(name, folder):
     text = drive.sources["dz_drive.c"].decode()
     assert text.count(old) == 1, old
     assert drive.edited("dz_drive.c", text.replace(old, new).encode()).check(prepared).faults > 0
+
+
+#: Of three pressures: what is remembered of the other side's.
+SEEDED_OF_THREE = {
+    "one memory for both sides": ("        own = 1u;\n", ""),
+    "the other side forgets its pressures": ("faulty_pressures[1u - own], others)", "faulty_pressures[1u - own], 0u)"),
+    "the other side's pressures count at once": ("(void)held_pressures(", "held |= held_pressures("),
+    "the latch of the other side is asked": (
+        "latched(block, drive->faulty_pressures[own])", "latched(block, drive->faulty_pressures[0])"),
+    "the drop of the side at rest is a fault": (
+        "    others &= DZ_STATUS_PRESSURE_A", "    others &= DZ_STATUS_DIFFERENCE | DZ_STATUS_PRESSURE_A"),
+    "C's bit is no fault": (" | DZ_STATUS_PRESSURE_C |\n", " |\n"),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def of_three(tmp_path_factory):
+    compensator = replace_faults(variant("three pressures"))
+    made = generate(compensator, "host")
+    folder = tmp_path_factory.mktemp("three") / "fw"
+    write_folder(folder, made.files, made.manifest)
+    return PreparedDrive(compensator, count=300), CompiledDrive(folder)
+
+
+def replace_faults(compensator):
+    """The same with a short debounce."""
+    return replace(compensator, drive_functions=replace(compensator.drive_functions, fault_samples=3))
+
+
+def test_of_three_pressures_nothing_is_found_without_a_seeded_fault(of_three):
+    prepared, drive = of_three
+    found = drive.check(prepared)
+    assert found.faults == 0, found.first_wrong
+
+
+@pytest.mark.parametrize("name", SEEDED_OF_THREE)
+def test_a_seeded_fault_of_the_third_pressure_is_found(name, of_three):
+    prepared, drive = of_three
+    old, new = SEEDED_OF_THREE[name]
+    text = drive.sources["dz_drive.c"].decode()
+    assert text.count(old) == 1, old
+    assert drive.edited("dz_drive.c", text.replace(old, new).encode()).check(prepared).faults > 0
+
+
+#: Sound pressures of `three`, and a C that no sensor gives.
+THREE, BROKEN_C = (2400, 1500, 1500), (2400, 1500, 0)
+PRESSURE_C = 512
+
+
+def test_a_failed_pressure_of_the_other_side_is_said_and_changes_no_output():
+    made = variant("three pressures")
+    functions = replace(made.drive_functions, ramp_up=(0, 0), fault_latch=False)
+    compensator = replace(made, drive_functions=functions)
+    zero, full = compensator.signals.command.zero_code, compensator.signals.command.full_code
+    sound, broken = Firmware(compensator), Firmware(compensator)
+    for firmware in (sound, broken):
+        give(firmware, zero, THREE, 5)
+    for command in (zero, full, (zero + full) // 2):
+        of_sound, of_broken = give(sound, command, THREE, 300), give(broken, command, BROKEN_C, 300)
+        assert [compare for compare, _ in of_sound] == [compare for compare, _ in of_broken]
+        assert {status for _, status in of_broken} == {PRESSURE_C | status for _, status in of_sound}
+    # Back again, it must have been valid for the debounce before the side that reads it uses it.
+    negative = compensator.signals.command.negative_full_code
+    give(broken, zero, BROKEN_C, 300)
+    statuses = []
+    for _ in range(10):
+        broken.sample(negative, *THREE)
+        statuses.append(broken.state.status & HELD)
+    assert statuses == [HELD] * 4 + [0] * 6
 
 
 def test_without_a_transition_the_declared_error_of_the_command_counts_as_zero():

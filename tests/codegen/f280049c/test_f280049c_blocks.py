@@ -153,8 +153,8 @@ def test_another_valves_block_drives_without_a_new_firmware(in_blocks):
 @pytest.mark.parametrize(
     ("name", "old", "new"),
     [
-        ("dz_isr.c", "        dz_state.fault |= DZ_FAULT_CALIBRATION;", ""),
-        ("dz_isr.c", "dz_state.calibration = dz_calibration_check(&dz_block)", "dz_state.calibration = 0u"),
+        ("dz_isr.c", "        state.fault |= DZ_FAULT_CALIBRATION;", ""),
+        ("dz_isr.c", "state.calibration = dz_calibration_check(&dz_block)", "state.calibration = 0u"),
         ("dz_calibration.c", "differs(block->crc32, crc_of(block))", "differs(crc_of(block), crc_of(block))"),
         ("dz_calibration.c", "differs(block->compare_max, DZ_COMPARE_MAX) |", ""),
     ],

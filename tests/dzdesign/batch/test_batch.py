@@ -241,8 +241,8 @@ def offsets_above_their_bounds(common, made: Path, names) -> list[str]:
         side = json.loads((made / "valves" / name / "valve.json").read_text())["sides"]["positive"]
         curve = side["certified"]["closing"]
         nodes, lower = ([Fraction(repr(value)) for value in curve[key]] for key in ("bound_dp_MPa", "bound_V"))
-        for code in range(common.signals.largest_difference(1) + 1):
-            dp = common.signals.dp_MPa(code)
+        for code in range(common.signals.pair(1).largest_difference + 1):
+            dp = common.signals.pair(1).dp_MPa(code)
             bounds = [
                 low + (high - low) * (dp - left) / (right - left)
                 for left, right, low, high in zip(nodes, nodes[1:], lower, lower[1:], strict=False)
@@ -263,7 +263,7 @@ def test_the_common_setting_over_compensates_no_valve(lot, made, tmp_path, capsy
     for name in names:  # nor where the truth is known
         bench = lot_bench(int(name[1:]), SEED)
         for dp_MPa in (1.0, 1.7, 2.5, 4.0, 5.0):
-            code = round(common.signals.dp_code(Fraction(dp_MPa)))
+            code = round(common.signals.pair(1).dp_code(Fraction(dp_MPa)))
             assert float(common.drive(0, code)) * 10 < bench.closing_V(dp_MPa)
     assert main(["codegen", str(path), "--target", "host", "-o", str(tmp_path / "firmware")]) == 0  # proved again there
 

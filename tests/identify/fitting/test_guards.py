@@ -205,8 +205,8 @@ class TestDesign:
         certificate = compensator.positive.certificate
         assert certificate.guard == name and certificate.smallest_margin_V >= 0
         low = valve.positive.valid_dp_MPa[0]
-        codes = range(compensator.signals.largest_difference(1) + 1)
-        dp = np.array([float(compensator.signals.dp_MPa(code)) for code in codes])
+        codes = range(compensator.signals.pair(1).largest_difference + 1)
+        dp = np.array([float(compensator.signals.pair(1).dp_MPa(code)) for code in codes])
         drive = np.array([compensator.compare(0, code) for code in codes]) / compensator.signals.compare_max * 10
         below = OPENS[trend](dp) - BELOW_OPENING[name] - drive
         # Above the tests too, where the offset is lowered with the continued bound.

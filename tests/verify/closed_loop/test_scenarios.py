@@ -169,12 +169,12 @@ def test_errors_of_the_converter_reach_the_core(scenes, example_compensator):
             for code, offset, gain in zip(right, errors.offset_codes[1:], errors.gain_codes[1:], strict=True)
         ]
         u_code = int(0.02 * 4096 + errors.offset_codes[0])
-        dp_code = signals.difference(*wrong)
+        dp_code = signals.pair(1).difference(*wrong)
         run = loop.run(command, 3.0, "compensated", back_MPa=1.0, errors=errors, periods_per_record=2)
         near = [example_compensator.compare(u_code, dp_code + step) for step in (-1, 0, 1)]
         assert min(near) <= run.compare[-1] <= max(near)
     noisy = loop.run(command, 3.0, "compensated", errors=ReadingErrors(noise_codes=(0, 4, 0)), periods_per_record=2)
-    found = {example_compensator.compare(81, signals.difference(*right) + step) for step in range(-5, 6)}
+    found = {example_compensator.compare(81, signals.pair(1).difference(*right) + step) for step in range(-5, 6)}
     seen = set(noisy.compare[105:].tolist())
     assert len(seen) > 5 and min(found) <= min(seen) <= max(seen) <= max(found)
 
@@ -187,12 +187,12 @@ def test_what_the_core_reads_is_what_the_sensors_show(plant_scenes):
     run = plant_scenes[0].loop.run(command, 2.0, "compensated", back_MPa=1.0, shown=shown, periods_per_record=2)
     before = np.concatenate([[2.0], run.dp_MPa])[:-1]
     for sensor, codes, pressure in (
-        (signals.pressure_a, run.code_a[:-50], 1.0 + before[:-50]),
-        (signals.pressure_b, run.code_b, np.ones(command.size)),
+        (signals.pressure_a, run.code_ahead[:-50], 1.0 + before[:-50]),
+        (signals.pressure_b, run.code_behind, np.ones(command.size)),
     ):
         span = (sensor.full_code - sensor.zero_code + 1) / float(sensor.span_MPa)
         assert np.array_equal(codes, np.floor(sensor.zero_code + pressure * span + 1e-9))
-    assert np.all(run.code_a[-50:] == 7)
+    assert np.all(run.code_ahead[-50:] == 7)
 
 
 def test_wrong_readings_cost_the_threshold_what_the_curve_says(example_compensator, scenes):
@@ -216,7 +216,7 @@ def test_wrong_readings_cost_the_threshold_what_the_curve_says(example_compensat
             code + sense * (converter.offset_codes + round(converter.gain_codes * code / signals.code_max))
             for code, sense in ((a, way), (b, -way))
         ]
-        offset_V = 10 * example_compensator.compare(0, signals.difference(*wrong)) / signals.compare_max
+        offset_V = 10 * example_compensator.compare(0, signals.pair(1).difference(*wrong)) / signals.compare_max
         expected.append(offset_V)
     assert expected[0] - expected[1] > 0.015
     assert room_V(1) - room_V(0) == pytest.approx(expected[0] - expected[1], abs=0.003)

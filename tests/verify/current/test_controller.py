@@ -10,9 +10,12 @@ import pytest
 from dzdesign.core.artefact_types import RuleError
 from dzdesign.core.errors import RequirementError
 from dzdesign.verify.current.controller_states import (
+    HELD,
+    OF_B,
     OPEN,
     OVER,
     SHORT,
+    B,
     HostStates,
     check_states,
     hashes_on,
@@ -39,7 +42,7 @@ def test_c_equals_the_exact_controller_state_by_state(name):
 def test_the_states_reach_every_part_of_the_controller(name):
     """Each fault, an output at its end, a wound-up integral at either end, and most states without a fault."""
     loop = LOOPS[name]
-    periods, _ = HostStates(loop, current_texts(loop)).periods(1, 50_000)
+    periods, _ = HostStates(loop, current_texts(loop)).periods(1, 100_000)
     after = periods["after"]
     for bit in (OPEN, SHORT, OVER):
         fresh = (after["faults"] & bit != 0) & (periods["before"]["faults"] & bit == 0)
@@ -50,6 +53,11 @@ def test_the_states_reach_every_part_of_the_controller(name):
     # With a larger limit the output is at its end before the integral is at its own.
     assert loop.integral_limit > 5000 or min(map(np.count_nonzero, reached)) > 20
     assert np.count_nonzero(after["compare"] == loop.compare_limit) > 500
+    if loop.two:
+        changed = after["on_b"] != periods["before"]["on_b"]
+        assert np.count_nonzero(changed & (after["on_b"] == B)) > 500 < np.count_nonzero(changed & (after["on_b"] == 0))
+        for bit in (bit << place for bit in (OPEN, SHORT, OVER, HELD) for place in (0, OF_B)):
+            assert np.count_nonzero((after["faults"] & bit != 0) & (periods["before"]["faults"] & bit == 0)) > 20
     assert np.count_nonzero((after["compare"] > 0) & (after["compare"] < loop.compare_limit)) > 500
 
 
@@ -113,8 +121,8 @@ SEEDED = {
     "another initial offset": ("block->current.offset_nominal", "block->current.offset_nominal + 1u"),
     "initial state not set": ("    loop->offset_total = 0u;\n", ""),
     "a short forgotten by the calibration": (
-        "&= DZ_CURRENT_SENSOR | DZ_CURRENT_OPEN | DZ_CURRENT_SHORT |",
-        "&= DZ_CURRENT_SENSOR | DZ_CURRENT_OPEN |",
+        "&= ~(uint32_t)DZ_CURRENT_NO_OFFSET",
+        "&= ~(uint32_t)(DZ_CURRENT_NO_OFFSET | DZ_CURRENT_SHORT)",
     ),
     "offset never wrong": ("? DZ_CURRENT_SENSOR : 0u", "? 0u : 0u"),
     "feed-forward of the current": ("(aim * numbers->feed", "(current * numbers->feed"),
@@ -124,12 +132,33 @@ SEEDED = {
 }
 
 
+SEEDED_OF_TWO = {
+    "the set point of the other solenoid": ("of_solenoid(asked_b, set_point_a", "of_solenoid(~asked_b, set_point_a"),
+    "followed before the change": (" set_point_b) & ~changes;", " set_point_b);"),
+    "solenoid forgotten at zero": ("| (loop->on_b & ~negative(0u - (uint32_t)set_point_a))", ""),
+    "outputs exchanged": ("loop->compare & ~loop->on_b;", "loop->compare & loop->on_b;"),
+    "both outputs": ("loop->compare & loop->on_b;", "loop->compare;"),
+    "the other shunt's offset": ("offset = of_solenoid(loop->on_b,", "offset = of_solenoid(~loop->on_b,"),
+    "decay not waited for": ("decayed = ~flows &", "decayed ="),
+    "decay seen while the output was on": (" & negative(loop->compare - 1u);", ";"),
+    "decay to one code more": ("~negative(above - numbers->open_sum)", "~negative(above - 1u - numbers->open_sum)"),
+    "a period longer to decay": ("reached(held_ticks - numbers->", "reached(loop->held_ticks - numbers->"),
+    "a current that stays is no fault": ("* DZ_CURRENT_HELD)", "* 0u)"),
+    "faults name the other": ("found << (loop->on_b & OF_B)", "found << (~loop->on_b & OF_B)"),
+    "sensor's fault without its solenoid": (" << OF_B;", ";"),
+    "offset of B with the sums of A": ("            loop->offset_total = 0u;\n", ""),
+    "calibrated as B": ("            loop->on_b = 0u;\n", ""),
+}  # fmt: skip
+
+
 @needs_compiler
-@pytest.mark.parametrize("fault", SEEDED)
-def test_a_wrong_controller_is_seen(fault):
-    loop = LOOPS["supply"]
+@pytest.mark.parametrize(
+    ("name", "fault"), [("supply", fault) for fault in SEEDED] + [("two shunts", fault) for fault in SEEDED_OF_TWO]
+)
+def test_a_wrong_controller_is_seen(name, fault):
+    loop = LOOPS[name]
     core = current_texts(loop)
-    right, wrong = SEEDED[fault]
+    right, wrong = (SEEDED | SEEDED_OF_TWO)[fault]
     assert core["dz_current.c"].count(right) == 1
     core["dz_current.c"] = core["dz_current.c"].replace(right, wrong)
     assert check_states(loop, core, 100_000)[0].wrong > 0

@@ -72,13 +72,13 @@ def with_bound(compensator, name, place, change):
 def slow_margin(compensator, each):
     """Return a valve's margin by its own curve, code by code."""
     signals, curve = compensator.signals, guarded_curve(each.valve.positive, "closing", "hold")
-    low, high = signals.difference_error(1)
+    low, high = signals.pair(1).difference_error(signals.code_max)
     kept = Fraction(1, 2 * signals.compare_max)
     margins, between = [], [end for piece in curve.certified.pieces for end in (piece.from_MPa, piece.to_MPa)]
-    for code in range(signals.largest_difference(1) + 1):
+    for code in range(signals.pair(1).largest_difference + 1):
         # The nodes of the bound stand for themselves where they lie between two codes.
-        ends = [dp for dp in between if signals.dp_MPa(code + low) <= dp <= signals.dp_MPa(code + high)]
-        places = [*(signals.dp_MPa(code + error) for error in range(low, high + 1)), *ends]
+        ends = [dp for dp in between if signals.pair(1).dp_MPa(code + low) <= dp <= signals.pair(1).dp_MPa(code + high)]
+        places = [*(signals.pair(1).dp_MPa(code + error) for error in range(low, high + 1)), *ends]
         bounds = [bound for bound in map(curve.bound, places) if bound is not None]
         drive = (compensator.beta(code) * compensator.positive.u_min0_over_u_max + kept) * compensator.u_max_V
         margins += [min(bounds) - drive] if bounds else []

@@ -13,12 +13,14 @@ from dzdesign.verify.hardware.board_values import MAKEFILE, PROJECT_FILE, Board,
 from dzdesign.verify.hardware.checks import hardware_checks
 from dzdesign.verify.hardware.model import Bench
 from tests.support.core_variants import BOTH
-from tests.support.example_coil import SENSORS, with_current
+from tests.support.example_coil import SENSORS, two_with_current, with_current
 from tests.support.golden_firmware import FULL, full_options, golden_compensator, golden_valve, write
 from tests.support.synthetic import needs_compiler
 
 pytestmark = needs_compiler
 ONE, BLOCK, TWO, (CURRENT, SUPPLY) = "one solenoid", "block form", "two solenoids", SENSORS
+#: Current control of two solenoids.
+SHARED, EACH = "one shunt", "two shunts"
 HARDWARE, MAIN, ISR, TELEMETRY = "dz_hardware.c", "main.c", "dz_isr.c", "dz_telemetry.c"
 PROJECTS = f"{PROJECT_FILE} {MAKEFILE}"
 
@@ -28,6 +30,8 @@ def compensator_of(target, form):
     if form == TWO:
         signals = Signals(command=BOTH, compare_max=target_named(target).compare_max)
         return design(golden_valve(FULL), full_options(signals=signals, negative_dp="wired"))
+    if form in (SHARED, EACH):
+        return two_with_current(target, shunts=1 + (form == EACH))
     made = golden_compensator(target)
     return made if form in (ONE, BLOCK) else with_current(made, target_named(target), SENSORS[form])
 
@@ -51,6 +55,9 @@ def found_of(folder, target, form=ONE, edit=None, calibration="fixed", **board):
     return {check.id: check.text for check in checks if not check.holds}
 
 
+EXCHANGED = """control_current();
+            { uint32_t a = loop.compare_a; loop.compare_a = loop.compare_b; loop.compare_b = a; }
+"""
 #: Form, file, what stands there, what somebody wrote instead, and the requirement that names it.
 BUGS = {
     "f28335": {
@@ -76,7 +83,7 @@ BUGS = {
         "output not held low": (ONE, MAIN, "    dz_output_hold_low();", "", "trip"),
         "starts without the crystal": (ONE, HARDWARE, "faults |= DZ_FAULT_CLOCK;", "", "start"),
         "starts after the watchdog": (ONE, HARDWARE, "faults |= DZ_FAULT_WATCHDOG;", "", "start"),
-        "samples lost unseen": (ONE, ISR, "dz_state.fault |= DZ_FAULT_NO_SAMPLE;", "", "sample-loss"),
+        "samples lost unseen": (ONE, ISR, "state.fault |= DZ_FAULT_NO_SAMPLE;", "", "sample-loss"),
         "watchdog served by the interrupt": (ONE, HARDWARE, "    DZ_PWM_A.ETCLR.bit.INT = 1u;\n    Pie",
                                              "    ServiceDog();\n    DZ_PWM_A.ETCLR.bit.INT = 1u;\n    Pie",
                                              "watchdog"),
@@ -116,7 +123,18 @@ BUGS = {
         "B for A": (TWO, ISR, "dz_write_compare_b(drive.compare_b)", "dz_write_compare_b(drive.compare_a)",
                     "solenoids"),
         "current too early": (CURRENT, HARDWARE, "CMPA.half.CMPA = DZ_CURRENT_START", "CMPA.half.CMPA = 0u", "current"),
-        "current of another channel": (CURRENT, "dz_hardware.h", "(DZ_BOARD_CURRENT * 0x1111u)", "0x3332u", "channels"),
+        "current of another channel": (CURRENT, "dz_hardware.h", "((channel) * 0x1111u)", "0x3332u", "channels"),
+        "outputs exchanged": (EACH, HARDWARE, "DZ_PWM_A.CMPA.half.CMPA = compare;\n    DZ_PWM_A.AQCSFRC",
+                              "DZ_PWM_B.CMPA.half.CMPA = compare;\n    DZ_PWM_B.AQCSFRC", "pwm"),
+        "outputs exchanged by the interrupt": (EACH, ISR, "control_current();\n", EXCHANGED, "channels"),
+        "the other shunt read": (EACH, HARDWARE, "(solenoid_b != 0u) ?", "(solenoid_b == 0u) ?", "channels"),
+        "one shunt read for both": (EACH, HARDWARE, "(DZ_BOARD_CURRENT_B)", "(DZ_BOARD_CURRENT)", "channels"),
+        "shunt not chosen again": (EACH, ISR, "    dz_select_current((uint16_t)(loop.on_b & 1u));\n    if (loop",
+                                   "    if (loop", "channels"),
+        "both outputs on": (SHARED, ISR, "dz_write_compare_b((uint16_t)loop.compare_b)",
+                            "dz_write_compare_b((uint16_t)loop.compare)", "solenoids"),
+        "the other one not held off": (SHARED, ISR, "dz_write_compare_b((uint16_t)loop.compare_b)",
+                                       "dz_write_compare_b(drive.compare_b)", "solenoids"),
         "comparator not selected": (SUPPLY, HARDWARE, "    DZ_PWM_A.TZSEL.bit.DZ_OVER",
                                     "    if (0) DZ_PWM_A.TZSEL.bit.DZ_OVER", "trip"),
     },
@@ -148,6 +166,13 @@ BUGS = {
         "flash defined by no project": (ONE, PROJECTS, "--define=_FLASH", "", "rates"),
         "a project's own board": (ONE, PROJECTS, "--define=_FLASH", "--define=_FLASH --define=DZ_BOARD_TRIP_GPIO=13",
                                   "trip"),
+        "outputs exchanged by the interrupt": (SHARED, ISR, "control_current();\n", EXCHANGED, "channels"),
+        "a shunt of the other channel": (EACH, HARDWARE, "DZ_CHANNEL(DZ_BOARD_CURRENT_B)",
+                                         "DZ_CHANNEL(DZ_BOARD_CURRENT)", "channels"),
+        "the other one not held off": (EACH, ISR, "dz_write_compare_b((uint16_t)loop.compare_b)",
+                                       "dz_write_compare_b(drive.compare_b)", "solenoids"),
+        "current started by the second output": (EACH, "dz_hardware.h", "DZ_BOARD_PWM_C), _SOCA",
+                                                 "DZ_BOARD_PWM_B), _SOCA", "current"),
         "current without its own flag": (CURRENT, HARDWARE, "        clear_flag(ADC_INT_NUMBER2);", "", "sample-loss"),
     },
 }  # fmt: skip

@@ -218,7 +218,7 @@ BUGS = {
     "difference of sums": (
         "dz_current.c", "reached((uint32_t)sum - numbers->short_sum)", "reached(sum - numbers->short_sum)", "current",
     ),
-    "in the interrupt": ("dz_isr.c", "sum <= (DZ_CURRENT_SAMPLES", "(sum + 1u) <= (DZ_CURRENT_SAMPLES", "current"),
+    "in the interrupt": ("dz_isr.c", "(ticks_without_current < DZ", "((ticks_without_current + 1u) < DZ", "current"),
 }  # fmt: skip
 
 

@@ -160,6 +160,11 @@ CURRENT_STEP = Requirement(id="current-step", title="the current follows a step 
 CURRENT_FAULTS = Requirement(
     id="current-faults", title="an open, shorted or over-driven coil switches the output off", how=BY_CURRENT
 )
+CURRENT_SOLENOIDS = Requirement(
+    id="current-solenoids",
+    title="a solenoid is driven once no current flows in the other",
+    how=f"{BY_CURRENT} of two solenoids",
+)
 CURRENT_VALVE = Requirement(
     id="current-valve", title="the valve opens at the same command with any coil and supply", how=BY_CURRENT
 )

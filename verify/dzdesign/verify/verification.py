@@ -225,7 +225,7 @@ REQUIREMENTS: tuple[Tried[Firmware], ...] = (
         lambda each: [functions_asked_for(each.compensator)],
         lambda each: each.compensator.options is not None,
     ),
-    Tried(requirements.OF_CURRENT, _current, Firmware.runs),
+    Tried((*requirements.OF_CURRENT, requirements.CURRENT_SOLENOIDS), _current, Firmware.runs),
     Tried(requirements.OF_LOOP, _closed_loop, Firmware.runs),
     Tried((requirements.BOARD_FILES,), _board, Firmware.is_as_generated),
     Tried(requirements.OF_GIVEN_LOOP, lambda _: (), lambda _: False),  # the closed loop's run tells of them

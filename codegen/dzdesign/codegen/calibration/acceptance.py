@@ -15,14 +15,15 @@ from dzdesign.codegen.calibration.layout import (
     BuiltFor,
     CalibrationBlock,
     CurrentBlock,
+    SensorBlock,
     SideBlock,
 )
 from dzdesign.codegen.core.integer_form import INT32_MAX, INT64_MAX
 from dzdesign.design.current.circuit import LARGEST_ERROR, LARGEST_GAIN
 from dzdesign.design.drive_functions import MOST_FAULT_SAMPLES
-from dzdesign.design.signals import LARGEST_DIFFERENCE, WEIGHT_SHIFT
+from dzdesign.design.signals import INPUT_NAMES, LARGEST_DIFFERENCE, WEIGHT_SHIFT
 
-#: Pressure drop in codes of sensor A times 4096: one more would be a code too many.
+#: Pressure drop in codes of the sensor ahead times 4096: one more would be a code too many.
 LARGEST_DROP = ((LARGEST_DIFFERENCE + 1) << WEIGHT_SHIFT) - 1
 #: Above it a difference from it could leave 31 bits.
 LARGEST_TESTED = 2**30 - 1
@@ -47,7 +48,12 @@ def largest_node(beta_step: int) -> int:
 NAMED: tuple[tuple[str, int, str, str], ...] = (
     ("LARGEST_WORD", 2**32 - 1, "uint32", "largest number of 32 bits"),
     ("LARGEST_INT32", INT32_MAX, "uint32", "largest number of 32 bits with a sign"),
-    ("LARGEST_DROP", LARGEST_DROP, "uint32", "largest pressure drop of valid codes, codes of sensor A times 4096"),
+    (
+        "LARGEST_DROP",
+        LARGEST_DROP,
+        "uint32",
+        "largest pressure drop of valid codes, codes of the sensor ahead times 4096",
+    ),
     ("LARGEST_TESTED", LARGEST_TESTED, "uint32", "largest limit of the tested pressure drops, in the same unit"),
     ("LARGEST_CODES", LARGEST_CODES, "plain", "largest count of codes, or of ticks, in 16 bits with a sign"),
     ("LARGEST_PLAY", LARGEST_PLAY, "plain", "most codes of travel between the branches of the play"),
@@ -74,7 +80,7 @@ def refusals(block: CalibrationBlock, built: BuiltFor) -> dict[str, tuple[str, .
     Law and drive functions count with the codes: of codes out of order they are not judged.
     """
     groups = {
-        "FORMAT": _format(block),
+        "FORMAT": _format(block, built),
         "FIRMWARE": _firmware(block, built),
         "SIGNALS": _signals(block, built),
         "LAW": _law(block, built),
@@ -86,11 +92,12 @@ def refusals(block: CalibrationBlock, built: BuiltFor) -> dict[str, tuple[str, .
     return {name: failed for name, failed in found.items() if failed and name not in unjudged}
 
 
-def _format(block: CalibrationBlock) -> Rules:
+def _format(block: CalibrationBlock, built: BuiltFor) -> Rules:
     yield "magic", block.magic == int.from_bytes(MAGIC, "little")
     yield "layout", block.layout == LAYOUT
     yield "length", block.length == LENGTH_WORDS
-    yield "unused words are 0", not (block.reserved or block.current.spare or any(side.spare for side in block.sides))
+    held = 0 if built.has("BIPOLAR") and built.has("CURRENT") else block.current.held_ticks
+    yield "unused words are 0", not (block.reserved or held or any(side.spare for side in block.sides))
 
 
 def _firmware(block: CalibrationBlock, built: BuiltFor) -> Rules:
@@ -99,33 +106,43 @@ def _firmware(block: CalibrationBlock, built: BuiltFor) -> Rules:
 
 
 def _signals(block: CalibrationBlock, built: BuiltFor) -> Rules:
-    for name in ("command", "a", "b"):
-        low, zero, high = (getattr(block, f"{name}_{end}") for end in ("low", "zero", "high"))
+    codes = {"command": (block.command_low, block.command_zero, block.command_high)}
+    codes |= {name: (each.low, each.zero, each.high) for name, each in zip(built.inputs, block.sensors, strict=False)}
+    for name, (low, zero, high) in codes.items():
         yield f"codes of {name}", low <= zero <= high <= built.code_max and low < high
-    no_pressure = (block.a_zero << WEIGHT_SHIFT) - block.b_zero * block.weight_b
-    yield "balance", block.balance == no_pressure % 2**32
-    yield "weight of sensor B", block.weight_b >= 1
     yield "reverse", block.reverse <= LARGEST_DROP
-    yield "pressure drops", all(drop <= LARGEST_DROP for drop in _drops(block))
+    for sign, side in zip((1, -1) if built.has("BIPOLAR") else (1,), block.sides, strict=False):
+        ahead, behind = (block.sensors[INPUT_NAMES.index(name)] for name in built.pair(sign))
+        no_pressure = (ahead.zero << WEIGHT_SHIFT) - behind.zero * side.weight
+        yield "balance", side.balance == no_pressure % 2**32
+        yield "weight of the sensor behind", side.weight >= 1
+        yield (
+            "pressure drops",
+            max(_drop(ahead, behind, side.weight), _rise(ahead, behind, side.weight)) <= LARGEST_DROP,
+        )
 
 
-def _drops(block: CalibrationBlock) -> tuple[int, int]:
-    """Return the largest A minus B, and the largest B minus A, of valid codes."""
-    forward = ((block.a_high - block.a_zero) << WEIGHT_SHIFT) + (block.b_zero - block.b_low) * block.weight_b
-    turned = ((block.a_zero - block.a_low) << WEIGHT_SHIFT) + (block.b_high - block.b_zero) * block.weight_b
-    return forward, turned
+def _drop(ahead: SensorBlock, behind: SensorBlock, weight: int) -> int:
+    """Return the largest pressure drop of valid codes."""
+    return ((ahead.high - ahead.zero) << WEIGHT_SHIFT) + (behind.zero - behind.low) * weight
+
+
+def _rise(ahead: SensorBlock, behind: SensorBlock, weight: int) -> int:
+    """Return the largest drop of valid codes the other way."""
+    return ((ahead.zero - ahead.low) << WEIGHT_SHIFT) + (behind.high - behind.zero) * weight
 
 
 def _law(block: CalibrationBlock, built: BuiltFor) -> Rules:
     yield "limit of the output", block.compare_limit <= built.compare_max
     rises = not built.has("FALLING")
-    forward, turned = _drops(block)
-    yield from _side(block, block.sides[0], built, rises, forward)
+    yield from _side(block, block.sides[0], built, 1, rises=rises)
     if built.has("BIPOLAR"):
-        yield from _side(block, block.sides[1], built, not rises, turned if built.has("SWAPPED") else forward)
+        yield from _side(block, block.sides[1], built, -1, rises=not rises)
 
 
-def _side(block: CalibrationBlock, side: SideBlock, built: BuiltFor, rises: bool, drop: int) -> Rules:
+def _side(block: CalibrationBlock, side: SideBlock, built: BuiltFor, sign: int, *, rises: bool) -> Rules:
+    ahead, behind = (block.sensors[INPUT_NAMES.index(name)] for name in built.pair(sign))
+    drop = _drop(ahead, behind, side.weight)
     zero, band, codes = block.command_zero, block.zero_band, block.transition_codes
     law, at_zero, mask = side.nodes[::2], side.nodes[1::2], built.sizes.node_mask
     used = [node for node in range(len(law)) if node < side.node_count or node >= mask]
@@ -183,7 +200,7 @@ def _current(current: CurrentBlock, built: BuiltFor) -> Rules:
     c = current
     yield "samples", c.samples == built.samples
     yield "limit of the current controller", c.compare_limit <= built.compare_max
-    yield "rate and ticks", min(c.rate, c.over_ticks, c.open_ticks) >= 1
+    yield "rate and ticks", min(c.rate, c.over_ticks, c.open_ticks, c.held_ticks or not built.has("BIPOLAR")) >= 1
     yield "shifts", 1 <= c.current_shift <= LARGEST_CURRENT_SHIFT and 1 <= c.gain_shift <= LARGEST_GAIN_SHIFT
     yield "gains", max(c.proportional, c.integral, c.feed_forward) <= LARGEST_GAIN and c.current_gain >= 1
     largest = (c.short_sum * c.current_gain + (1 << c.current_shift >> 1)) >> c.current_shift

@@ -15,6 +15,7 @@ from dzdesign.codegen.calibration.layout import (
     BuiltFor,
     CalibrationBlock,
     CurrentBlock,
+    SensorBlock,
     SideBlock,
     Sizes,
     entries,
@@ -25,13 +26,13 @@ from dzdesign.codegen.telemetry.frame import beta_factor
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.current.circuit import CurrentLoop
-from dzdesign.design.signals import SIDE_NAMES, WEIGHT_SHIFT
+from dzdesign.design.signals import SIDE_NAMES, WEIGHT_SHIFT, PressureSignal
 
 #: Nodes that stand for pressures that can't be right.
 FALLBACKS = 2
 ALTERNATIVE = "generate it with --calibration fixed"
 
-Part = TypeVar("Part", SideBlock, CurrentBlock)
+Part = TypeVar("Part", SensorBlock, SideBlock, CurrentBlock)
 
 
 def built_for(compensator: Compensator, *, fixed: bool = False) -> BuiltFor:
@@ -40,9 +41,11 @@ def built_for(compensator: Compensator, *, fixed: bool = False) -> BuiltFor:
     holds = {
         "BIPOLAR": compensator.negative is not None,
         "FALLING": signals.command.direction(1) < 0,
-        "SWAPPED": signals.swapped and compensator.negative is not None,
+        **{f"AHEAD_{name}": signals.negative_pair[0] == name for name in "BC"},
+        **{f"BEHIND_{name}": signals.negative_pair[1] == name for name in "AC"},
         "CURRENT": drive is not None,
         "SUPPLY": drive is not None and drive.loop.supply is not None,
+        "SHUNTS": drive is not None and drive.loop.shunts == 2,
     }
     return BuiltFor(
         shape=sum(holds[name] << place for place, name in enumerate(SHAPE_BITS)),
@@ -63,6 +66,7 @@ def _sizes_for(compensator: Compensator) -> Sizes:
     play = max(len(functions.play_counts[place]) for place in range(len(signs))) if functions.has_play else 0
     supply = len(drive.loop.supply.nodes) if drive and drive.loop.supply else 0
     return Sizes(
+        sensors=len(compensator.signals.pressures),
         sides=len(signs),
         # The fallback stands at the mask, behind every node of the table.
         node_mask=_all_ones(max(len(compensator.side(sign).beta) for sign in signs)),
@@ -121,7 +125,8 @@ def _refused(block: CalibrationBlock, built: BuiltFor) -> str:
 def _numbers(compensator: Compensator, built: BuiltFor, digest: str, serial: str, record: str) -> CalibrationBlock:
     """Return the numbers, whatever their firmware says of them."""
     c, signals, functions = compensator, compensator.signals, compensator.drive_functions
-    command, a, b = signals.command, signals.pressure_a, signals.pressure_b
+    command = signals.command
+    sensors = [_sensor(name, sensor, built) for name, sensor in signals.pressures.items()]
     interlock = functions.interlock_codes
     return CalibrationBlock(
         length=LENGTH_WORDS,
@@ -134,22 +139,11 @@ def _numbers(compensator: Compensator, built: BuiltFor, digest: str, serial: str
         serial=text_words(serial, SERIAL_WORDS, "the serial number"),
         record=text_words(record, RECORD_WORDS, "the record"),
         u_max_uV=0 if built.fixed else _displayed(float(c.u_max_V), "full command in V"),
-        a_span_Pa=0 if built.fixed else _displayed(float(a.span_MPa), "the span of sensor A in MPa"),
-        b_span_Pa=0 if built.fixed else _displayed(float(b.span_MPa), "the span of sensor B in MPa"),
-        a_full=a.full_code,
-        b_full=b.full_code,
-        balance=((a.zero_code << WEIGHT_SHIFT) - b.zero_code * signals.weight_b) % 2**32,
+        sensors=(sensors[0], sensors[1], sensors[2] if len(sensors) > 2 else _nothing(SensorBlock)),
         reverse=c.reverse_codes << WEIGHT_SHIFT,
         command_zero=command.zero_code,
         command_low=command.valid_codes[0],
         command_high=command.valid_codes[1],
-        a_zero=a.zero_code,
-        a_low=a.valid_codes[0],
-        a_high=a.valid_codes[1],
-        b_zero=b.zero_code,
-        b_low=b.valid_codes[0],
-        b_high=b.valid_codes[1],
-        weight_b=signals.weight_b,
         beta_step=c.beta_step_codes,
         transition_codes=c.transition_codes or 1,
         zero_band=c.zero_band_codes,
@@ -171,11 +165,23 @@ def _numbers(compensator: Compensator, built: BuiltFor, digest: str, serial: str
     )
 
 
+def _sensor(name: str, sensor: PressureSignal, built: BuiltFor) -> SensorBlock:
+    """Return the numbers of the sensor at one pressure input."""
+    return SensorBlock(
+        span_Pa=0 if built.fixed else _displayed(float(sensor.span_MPa), f"the span of sensor {name} in MPa"),
+        full=sensor.full_code,
+        zero=sensor.zero_code,
+        low=sensor.valid_codes[0],
+        high=sensor.valid_codes[1],
+    )
+
+
 def _side(c: Compensator, sign: int, sizes: Sizes) -> SideBlock:
     """Return the law of one sign of command."""
     form, side, functions, command = integer_form(c, sign), c.side(sign), c.drive_functions, c.signals.command
     place = 0 if sign > 0 else 1
-    codes = floor(c.signals.dp_code(side.certificate.dp_MPa[1]))
+    pair = c.signals.pair(sign)
+    codes = floor(pair.dp_code(side.certificate.dp_MPa[1]))
     unit = form.scale_beta * c.beta_denominator
     factor, shift = beta_factor(unit * c.beta_step_codes, max(form.table) * c.beta_step_codes)
     return SideBlock(
@@ -184,6 +190,8 @@ def _side(c: Compensator, sign: int, sizes: Sizes) -> SideBlock:
         transition=form.transition,
         linear=form.linear << form.linear_shift,
         **_division(form, functions.compare_limit),
+        balance=((pair.ahead.zero_code << WEIGHT_SHIFT) - pair.behind.zero_code * pair.weight) % 2**32,
+        weight=pair.weight,
         tested_to=((codes + 1) << WEIGHT_SHIFT) - 1,
         beta_unit=unit,
         beta_factor=factor,

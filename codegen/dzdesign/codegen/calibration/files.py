@@ -21,6 +21,7 @@ from dzdesign.codegen.calibration.layout import (
     BuiltFor,
     CalibrationBlock,
     CurrentBlock,
+    SensorBlock,
     SideBlock,
     Words,
     entries,
@@ -36,6 +37,7 @@ from dzdesign.codegen.core.certificate_text import (
 )
 from dzdesign.codegen.core.constants import (
     LITERALS,
+    OF_B,
     Define,
     Values,
     c_comment,
@@ -51,7 +53,7 @@ from dzdesign.derivation.law import law
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.current.circuit import CORRECTION_SHIFT
 from dzdesign.design.drive_functions import RAMP_UNIT
-from dzdesign.design.signals import WEIGHT_SHIFT
+from dzdesign.design.signals import INPUT_NAMES, WEIGHT_SHIFT
 
 #: Bits of what dz_calibration_check() finds wrong.
 FINDINGS = {
@@ -64,7 +66,12 @@ FINDINGS = {
     "CURRENT": "a number of the current controller outside the range of the arithmetic",
 }
 #: Structs of the block, in the order in which C needs them, and their names there.
-STRUCTS = {SideBlock: "dz_calibration_side", CurrentBlock: "dz_calibration_current", CalibrationBlock: "dz_calibration"}
+STRUCTS = {
+    SensorBlock: "dz_calibration_sensor",
+    SideBlock: "dz_calibration_side",
+    CurrentBlock: "dz_calibration_current",
+    CalibrationBlock: "dz_calibration",
+}
 #: Members whose length is a macro of the firmware.
 LENGTHS = {
     "nodes": "DZ_CALIBRATION_NODES",
@@ -121,7 +128,9 @@ def _form(built: BuiltFor) -> Values:
         "given": "" if built.fixed else "block, ",
         "numbers": "const struct dz_calibration *block = &dz_valve;",
         "bipolar": built.has("BIPOLAR"),
-        "swapped": built.has("SWAPPED"),
+        "three": "C" in built.inputs,
+        "pressures": {name: f"p_{name.lower()}_adc" for name in built.inputs},
+        "shunts": built.has("SHUNTS"),
     }
 
 
@@ -179,7 +188,7 @@ def _rational(value: Fraction) -> str:
 def _constants(built: BuiltFor, numbers: CalibrationBlock | None) -> dict[str, list[Define]]:
     """Return the constants of each file, in the order of the files."""
     shifts = [
-        Define(symbol="WEIGHT_SHIFT", value=WEIGHT_SHIFT, equation="from weighted codes to codes of sensor A",
+        Define(symbol="WEIGHT_SHIFT", value=WEIGHT_SHIFT, equation="from weighted codes to codes of the sensor ahead",
                engineering=f"1/2^{WEIGHT_SHIFT}", rounding="the difference is rounded down"),
         Define(symbol="BETA_STEP_SHIFT", value=built.beta_step.bit_length() - 1,
                equation="the power of two in DZ_BETA_STEP", engineering=f"1/{built.beta_step}"),
@@ -200,7 +209,7 @@ def _constants(built: BuiltFor, numbers: CalibrationBlock | None) -> dict[str, l
         _limit("LARGEST_WIDE_SHIFT", 63, "plain", "largest shift of 64 bits"),
         difference_place(),
     ]
-    found["dz_comp.h"] = status_constants()
+    found["dz_comp.h"] = status_constants(built.inputs)
     found["dz_drive.c"] = [
         _limit("RAMP_UNIT", RAMP_UNIT, "uint32", "unit of the ramped command, a code of command"),
         _limit("NO_INTERLOCK", NO_INTERLOCK, "plain", "the drive waits for no zero command"),
@@ -220,10 +229,13 @@ def _constants(built: BuiltFor, numbers: CalibrationBlock | None) -> dict[str, l
     ]  # fmt: skip
     if built.has("CURRENT"):
         found["dz_current.c"] = [_limit("SHIFT_MASK", 15, "plain", "mask of a shift")]
-        found["dz_current.h"] = current_fault_bits()
+        found["dz_current.h"] = current_fault_bits(two=built.has("BIPOLAR"))
+    if built.has("CURRENT") and built.has("BIPOLAR"):
+        found["dz_current.c"].append(_limit("OF_B", OF_B, "plain", "places by which faults of solenoid B stand higher"))
     if built.has("CURRENT") and numbers is not None:
-        offset = Define(symbol="DZ_CURRENT_OFFSET_TICKS", value=1 << numbers.current.offset_shift,
-                        equation="sums that the offset is the mean of", engineering="with the output off")  # fmt: skip
+        sums = (1 + built.has("SHUNTS")) << numbers.current.offset_shift
+        offset = Define(symbol="DZ_CURRENT_OFFSET_TICKS", value=sums, equation="sums of the offset's calibration",
+                        engineering="with the output off")  # fmt: skip
         found["dz_current.h"].insert(0, offset)
     if built.has("SUPPLY"):
         found["dz_current.c"] += [
@@ -255,19 +267,29 @@ def _sides(built: BuiltFor) -> list[Values]:
     """Return the C that depends on the sign of command: ending of the names, and which way the signals count."""
     rises, falls = "u - side->band_end", "side->band_end - u"
     forward, back = (falls, rises) if built.has("FALLING") else (rises, falls)
-    swapped = "0u - " if built.has("SWAPPED") else ""
-    positive = {"s": "", "text": "positive", "from_band": forward, "turn": "", "pad": ""}
-    negative = {"s": "_negative", "text": "negative", "from_band": back, "turn": swapped, "pad": " " * 9}
+    positive = {"s": "", "text": "positive", "from_band": forward, "pad": "", **_pair(built, 1)}
+    negative = {"s": "_negative", "text": "negative", "from_band": back, "pad": " " * 9, **_pair(built, -1)}
     return [positive, negative] if built.has("BIPOLAR") else [positive]
+
+
+def _pair(built: BuiltFor, sign: int) -> Values:
+    """Return the pressure inputs of a side: of each its name, that of its code, and its sensor in the struct."""
+    return {
+        place: {"name": name, "code": f"p_{name.lower()}_adc", "sensor": f"block->sensors[{INPUT_NAMES.index(name)}]"}
+        for place, name in zip(("ahead", "behind"), built.pair(sign), strict=True)
+    }
 
 
 def _declarations(kind: type, built: BuiltFor) -> Iterator[str]:
     """Yield the lines of a struct's members, each with its comment."""
     own = entries(kind)
     for name in kind.__dataclass_fields__:  # type: ignore[attr-defined]
-        if name in own and not (built.fixed and own[name].of_block):
+        if name in own and built.keeps(own[name]):
             yield from c_comment(_comment(own[name]))
             yield f"{_declared(name, own[name])};"
+        elif name == "sensors":
+            yield from c_comment("Of the pressures A, B and C; all zero where there is none.")
+            yield "struct dz_calibration_sensor sensors[DZ_CALIBRATION_SENSORS];"
         elif name == "sides":
             yield from c_comment("Of positive, then of negative commands; all zero where there are none.")
             yield "struct dz_calibration_side sides[DZ_CALIBRATION_SIDES];"
@@ -314,6 +336,7 @@ def _interface(built: BuiltFor) -> list[Define]:
         found.append(
             define("DZ_CURRENT_SAMPLES", built.samples, "samples of the current in a sum", "0 without current control")
         )
+    found.append(define("DZ_CALIBRATION_SENSORS", sizes.sensors, "room for pressure sensors", "A, B, C"))
     found.append(define("DZ_CALIBRATION_SIDES", sizes.sides, "room for signs of command", "positive, negative"))
     for name, mask, what in (
         ("NODE", sizes.node_mask, "nodes of beta"),
@@ -360,7 +383,7 @@ def block_values(compensator: Compensator, block: CalibrationBlock | None, targe
         "block_headers": (BLOCK_HEADER,) if block else (),
         "block_lines": lines,
         "command_zero": "dz_block.command_zero" if block else "DZ_DRIVE_COMMAND_ZERO",
-        "offset_ticks": f"{1 << current.loop.offset_shift}u" if block and current else "DZ_CURRENT_OFFSET_TICKS",
+        "offset_ticks": f"{current.loop.offset_ticks}u" if block and current else "DZ_CURRENT_OFFSET_TICKS",
         "sector": sector is not None,
     }
     if sector:

@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from dataclasses import MISSING, dataclass, field, fields
 from typing import Any, NamedTuple
 
+from dzdesign.design.signals import INPUT_NAMES, POSITIVE_PAIR
+
 #: Octets of `magic` in a file, and the version of this layout.
 MAGIC, LAYOUT = b"DZC1", 1
 #: Nodes of beta that a side of a block has room for, the two of the fallback behind those of the table; the core masks
@@ -22,9 +24,13 @@ SHA256_WORDS, SERIAL_WORDS, RECORD_WORDS = 16, 12, 24
 SHAPE_BITS = {
     "BIPOLAR": "two solenoids: a command of both signs",
     "FALLING": "codes of the command fall towards full positive command",
-    "SWAPPED": "the pressure drop of negative commands is B less A",
+    "AHEAD_B": "pressure B is ahead at negative commands, and not A",
+    "AHEAD_C": "pressure C is ahead at negative commands, and not A",
+    "BEHIND_A": "pressure A is behind at negative commands, and not B",
+    "BEHIND_C": "pressure C is behind at negative commands, and not B",
     "CURRENT": "the drive's output is the set point of a current",
     "SUPPLY": "the supply's voltage is measured",
+    "SHUNTS": "each of two solenoids has a shunt",
 }
 #: `interlock` where the drive waits for no zero command.
 NO_INTERLOCK = 0xFFFF
@@ -48,6 +54,8 @@ class Words:
     rounding: str = "exact"
     #: Whether only a block has it, to be recognised, checked and displayed: no arithmetic reads it.
     of_block: bool = False
+    #: Whether only two solenoids have it.
+    of_two: bool = False
 
     @property
     def words(self) -> int:
@@ -65,11 +73,23 @@ def _shown(text: str, unit: str = "", key: str = "", bits: int = 16, **more: Any
     return _words(text, unit, key, bits, of_block=True, **more)
 
 
-_COMMAND, _SENSOR_A, _SENSOR_B = "signals.command", "signals.pressure_a", "signals.pressure_b"
+_COMMAND, _SENSOR = "signals.command", "signals.pressure_*"
 _DRIVE, _LOOP = "drive_functions", "current_drive.loop"
+_WEIGHTED = "1/4096 code of the sensor ahead"
 _CODE = "the converter's code, rounded down"
 _POWER = "a power of two"
 _NEAREST = "rounded to nearest"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SensorBlock:
+    """A pressure sensor; all zero where the firmware has none."""
+
+    span_Pa: int = _shown("span, for display", "Pa", f"{_SENSOR}.span_MPa", 32)
+    full: int = _shown("code at its span, for display", "codes", f"{_SENSOR}.full_code")
+    zero: int = _shown("code at zero pressure", "codes", f"{_SENSOR}.zero_code")
+    low: int = _words("lowest valid code", "codes", f"{_SENSOR}.valid_codes", rounding=_CODE)
+    high: int = _words("highest valid code", "codes", f"{_SENSOR}.valid_codes", rounding=_CODE)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,8 +119,13 @@ class SideBlock:
         "factor from the quotient to counts, over 2^(32 + reciprocal_shift)", bits=32,
         rounding="above it, and exact for every quotient up to quotient_limit",
     )  # fmt: skip
+    balance: int = _words(
+        "difference of the codes at zero pressure: that ahead times 4096 minus that behind times weight, modulo 2^32",
+        _WEIGHTED, "signals", 32,
+    )  # fmt: skip
+    weight: int = _words("weight of a code of the sensor behind", _WEIGHTED, "signals", 32, rounding=_NEAREST)
     tested_to: int = _words(
-        "largest tested pressure drop", "1/4096 code of A", "sides.*.certificate.dp_MPa", 32,
+        "largest tested pressure drop", _WEIGHTED, "sides.*.certificate.dp_MPa", 32,
         rounding="rounded down to a code, with all that is rounded down to that code",
     )  # fmt: skip
     beta_unit: int = _shown("value of beta = 1 in a node, for display", "", "beta_denominator", 32)
@@ -167,7 +192,10 @@ class CurrentBlock:
         "nominal over measured supply times 2^14, from supply_low on", "", f"{_LOOP}.supply.nodes", count=SUPPLY_NODES,
         rounding=_NEAREST,
     )  # fmt: skip
-    spare: int = _shown("0", value=0)
+    held_ticks: int = _words(
+        "PWM periods with a current after the other solenoid was asked for that are a fault; 0 with one solenoid",
+        key=f"{_LOOP}.held_ticks", of_two=True,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -187,31 +215,15 @@ class CalibrationBlock:
     serial: tuple[int, ...] = _shown("serial number, up to 24 octets of UTF-8", count=SERIAL_WORDS)
     record: tuple[int, ...] = _shown("what the valve is filed under, up to 48 octets of UTF-8", count=RECORD_WORDS)
     u_max_uV: int = _shown("full command, for display", "uV", "u_max_V", 32)
-    a_span_Pa: int = _shown("span of sensor A, for display", "Pa", f"{_SENSOR_A}.span_MPa", 32)
-    b_span_Pa: int = _shown("span of sensor B, for display", "Pa", f"{_SENSOR_B}.span_MPa", 32)
-    a_full: int = _shown("code of sensor A at its span, for display", "codes", f"{_SENSOR_A}.full_code")
-    b_full: int = _shown("code of sensor B at its span, for display", "codes", f"{_SENSOR_B}.full_code")
-    balance: int = _words(
-        "difference of the codes at zero pressure: a_zero times 4096 minus b_zero times weight_b, modulo 2^32",
-        "1/4096 code of A", f"{_SENSOR_A}.zero_code", 32,
-    )  # fmt: skip
+    sensors: tuple[SensorBlock, SensorBlock, SensorBlock]
     reverse: int = _words(
-        "a pressure drop less than minus this is a failed sensor", "1/4096 code of A", "reverse_codes", 32,
+        "a pressure drop less than minus this is a failed sensor", _WEIGHTED, "reverse_codes", 32,
         rounding="a hundredth of the span, rounded down to a code",
     )  # fmt: skip
-    weight_b: int = _words(
-        "weight of a code of sensor B", "1/4096 code of A", f"{_SENSOR_B}.span_MPa", 32, rounding=_NEAREST
-    )
     command_zero: int = _words("code of zero command", "codes", f"{_COMMAND}.zero_code", rounding=_CODE)
     command_low: int = _words("lowest valid code of the command", "codes", f"{_COMMAND}.valid_codes", rounding=_CODE)
     command_high: int = _words("highest valid code of the command", "codes", f"{_COMMAND}.valid_codes", rounding=_CODE)
-    a_zero: int = _shown("code at zero pressure, sensor A", "codes", f"{_SENSOR_A}.zero_code")
-    a_low: int = _words("lowest valid code of sensor A", "codes", f"{_SENSOR_A}.valid_codes", rounding=_CODE)
-    a_high: int = _words("highest valid code of sensor A", "codes", f"{_SENSOR_A}.valid_codes", rounding=_CODE)
-    b_zero: int = _shown("code at zero pressure, sensor B", "codes", f"{_SENSOR_B}.zero_code")
-    b_low: int = _words("lowest valid code of sensor B", "codes", f"{_SENSOR_B}.valid_codes", rounding=_CODE)
-    b_high: int = _words("highest valid code of sensor B", "codes", f"{_SENSOR_B}.valid_codes", rounding=_CODE)
-    beta_step: int = _shown("codes of pressure drop between two nodes of beta", "codes of A", "beta_step_codes")
+    beta_step: int = _shown("codes of pressure drop between two nodes of beta", "codes", "beta_step_codes")
     transition_codes: int = _words(
         "codes of command of the transition; 1: none", "codes", "transition_codes", rounding=_POWER
     )
@@ -254,6 +266,7 @@ class Sizes:
     An array has two elements more than the mask of its index, which is all ones.
     """
 
+    sensors: int = len(INPUT_NAMES)
     sides: int = 2
     node_mask: int = NODE_MASK
     play_mask: int = PLAY_MASK
@@ -290,6 +303,21 @@ class BuiltFor:
         """Tell whether the shape has a bit of `SHAPE_BITS`."""
         return bool(self.shape >> list(SHAPE_BITS).index(name) & 1)
 
+    def keeps(self, entry: Words) -> bool:
+        """Tell whether the C struct has an entry: every block has each, a firmware with its numbers what it reads."""
+        return not self.fixed or not (entry.of_block or (entry.of_two and not self.has("BIPOLAR")))
+
+    def pair(self, sign: int) -> str:
+        """Return the names of the pressure inputs ahead and behind, for one sign of command."""
+        ahead = next((name for name in "BC" if sign < 0 and self.has(f"AHEAD_{name}")), "A")
+        behind = next((name for name in "AC" if sign < 0 and self.has(f"BEHIND_{name}")), "B")
+        return ahead + behind
+
+    @property
+    def inputs(self) -> str:
+        """Names of the pressure inputs."""
+        return INPUT_NAMES if "C" in self.pair(-1) else POSITIVE_PAIR
+
 
 class Member(NamedTuple):
     """One member of the C struct: its name there, the word it begins at, and what it is."""
@@ -300,7 +328,7 @@ class Member(NamedTuple):
 
 
 #: Number of elements of the members that are structs themselves, and their types.
-INNER = {"sides": (SideBlock, 2), "current": (CurrentBlock, 1)}
+INNER = {"sensors": (SensorBlock, len(INPUT_NAMES)), "sides": (SideBlock, 2), "current": (CurrentBlock, 1)}
 
 
 def entries(block: type) -> dict[str, Words]:

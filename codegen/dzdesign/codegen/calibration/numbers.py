@@ -16,18 +16,30 @@ from dzdesign.derivation.law import law
 from dzdesign.derivation.presentation.formulas import to_text
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.drive_functions import RAMP_UNIT
-from dzdesign.design.signals import SIDE_NAMES
+from dzdesign.design.signals import INPUT_NAMES, SIDE_NAMES
 
 SIGNS = (1, -1)
-#: Before the first member of each struct in the block's, and behind its last one.
-OPENS = {
-    "": (),
-    "sides[0]": (".sides = {", "    { /* positive commands */"),
-    "sides[1]": ("    { /* negative commands */",),
-    "current": (".current = {",),
+#: What the elements of an array of structs are.
+ELEMENTS = {
+    "sensors": [f"pressure {name}" for name in INPUT_NAMES],
+    "sides": ["positive commands", "negative commands"],
 }
-CLOSES = {"": (), "sides[0]": ("    },", "},"), "sides[1]": ("    },", "},"), "current": ("},",)}
-INDENTS = {"": "", "sides[0]": " " * 8, "sides[1]": " " * 8, "current": " " * 4}
+
+
+def _element(place: str) -> tuple[str, int]:
+    """Return the name and the index of an element of an array of structs; of anything else its name and 0."""
+    group, _, index = place.rstrip("]").partition("[")
+    return group, int(index or 0)
+
+
+def _between(before: str, after: str) -> list[str]:
+    """Return the lines between the last member of one struct in the block's and the first of another; "" is itself."""
+    (left, _), (group, element) = _element(before), _element(after)
+    lines = ["    },"] if left in ELEMENTS else []
+    if left != group:
+        lines += ["},"] if left else []
+        lines += [f".{group} = {{"] if group else []
+    return lines + ([f"    {{ /* {ELEMENTS[group][element]} */"] if group in ELEMENTS else [])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,25 +54,30 @@ class ValvePage:
         """Return what stands between the braces of a `struct dz_calibration`: the members that this firmware has."""
         parts: dict[str, object] = {"": self.block, "current": self.block.current}
         # What is not set C makes zero.
-        parts |= {f"sides[{place}]": self.block.sides[place] for place in range(len(self.compensator.signals.signs))}
+        signals = self.compensator.signals
+        parts |= {f"sensors[{place}]": self.block.sensors[place] for place in range(len(signals.pressures))}
+        parts |= {f"sides[{place}]": self.block.sides[place] for place in range(len(signals.signs))}
         if self.built.fixed and not self.built.has("CURRENT"):
             del parts["current"]
         lines: list[str] = []
         within = ""
         for path, _, entry in members():
             place, _, name = path.rpartition(".")
-            if place not in parts or (entry.of_block and self.built.fixed):
+            if place not in parts or not self.built.keeps(entry):
                 continue
             if place != within:
-                lines += [*CLOSES[within][: 1 if place == "sides[1]" else None], *OPENS[place]]
+                lines += _between(within, place)
                 within = place
-            sign = SIGNS[place == "sides[1]"] if place.startswith("sides") else 0
+            group, element = _element(place)
+            sign = SIGNS[element] if group == "sides" else 0
             known = self._sides[sign] if sign else self._current if place == "current" else self._own
-            key = entry.key.replace("*", SIDE_NAMES[sign]) if sign else entry.key
-            indent, value = INDENTS[place], getattr(parts[place], name)
+            if group == "sensors":
+                known = self._sensors[element]
+            key = entry.key.replace("*", SIDE_NAMES[sign] if sign else INPUT_NAMES[element].lower())
+            indent, value = " " * (8 if group in ELEMENTS else 4 if group else 0), getattr(parts[place], name)
             said = self._comment(entry, known.get(name, ""), key, len(indent) + 4)
             lines += [f"{indent}{line}" for line in (*said, *self._assigned(name, entry, value, sign))]
-        return [*lines, *CLOSES[within]]
+        return [*lines, *_between(within, "")]
 
     @staticmethod
     def _comment(entry: Words, engineering: str, key: str, indent: int) -> list[str]:
@@ -91,7 +108,7 @@ class ValvePage:
         unit, units = integer_form(c, sign).scale_beta * c.beta_denominator, c.valve.recorded_units
         pairs = [f"{{UINT32_C({law}), UINT32_C({zero})}}," for law, zero in zip(value[::2], value[1::2], strict=True)]
         for node in range(len(c.side(sign).beta)):
-            place = units.text(float(c.signals.dp_MPa(node * c.beta_step_codes)), ".3f MPa")
+            place = units.text(float(c.signals.pair(sign).dp_MPa(node * c.beta_step_codes)), ".3f MPa")
             law_beta, zero_beta = (number / unit for number in value[2 * node : 2 * node + 2])
             certified = f", certified {zero_beta:.6f}" if law_beta != zero_beta else ""
             yield f"{pairs[node]} /* {place}: beta {law_beta:.6f}{certified} */"
@@ -107,7 +124,7 @@ class ValvePage:
     def _own(self) -> dict[str, str]:
         c, signals, functions = self.compensator, self.compensator.signals, self.compensator.drive_functions
         units, u_max_V = c.valve.recorded_units, float(c.u_max_V)
-        command, controller, a, b = signals.command, units.of_controller, signals.pressure_a, signals.pressure_b
+        command, controller = signals.command, units.of_controller
         share, limit = self._share, functions.compare_limit / signals.compare_max
         found = {"magic": "", "serial": text_of(self.block.serial), "record": text_of(self.block.record)}
 
@@ -118,16 +135,8 @@ class ValvePage:
 
         for name, code in zip(("zero", "low", "high"), (command.zero_code, *command.valid_codes), strict=True):
             found[f"command_{name}"] = reading(code)
-        for name, sensor in (("a", a), ("b", b)):
-            for end, code in zip(("zero", "low", "high", "full"),
-                                 (sensor.zero_code, *sensor.valid_codes, sensor.full_code), strict=True):  # fmt: skip
-                pressure = float((code - sensor.zero_code) * sensor.per_code_MPa)
-                found[f"{name}_{end}"] = units.text(pressure, ".4g MPa")
-        a_MPa, b_MPa = (float(sensor.per_code_MPa) for sensor in (a, b))
         found |= {
-            "balance": f"codes {a.zero_code} of A and {b.zero_code} of B",
-            "reverse": units.text(float(signals.dp_MPa(c.reverse_codes)), ".3f MPa"),
-            "weight_b": f"{units.text(b_MPa, '.6g MPa')} / {units.text(a_MPa, '.6g MPa')} = {b_MPa / a_MPa:.6g}",
+            "reverse": units.text(float(signals.pair(1).dp_MPa(c.reverse_codes)), ".3f MPa"),
             "transition_codes": share(c.transition_codes) if c.transition_codes else "none",
             "zero_band": f"{share(c.zero_band_codes)}; error of a zero command, {c.command_error.offset_codes} + "
             f"{c.command_error.noise_codes} codes",
@@ -153,6 +162,21 @@ class ValvePage:
         return found
 
     @cached_property
+    def _sensors(self) -> list[dict[str, str]]:
+        units = self.compensator.valve.recorded_units
+        return [
+            {
+                name: units.text(float((code - sensor.zero_code) * sensor.per_code_MPa), ".4g MPa")
+                for name, code in zip(
+                    ("zero", "low", "high", "full"),
+                    (sensor.zero_code, *sensor.valid_codes, sensor.full_code),
+                    strict=True,
+                )
+            }
+            for sensor in self.compensator.signals.pressures.values()
+        ]
+
+    @cached_property
     def _sides(self) -> dict[int, dict[str, str]]:
         return {sign: self._side(sign) for sign in self.compensator.signals.signs}
 
@@ -162,6 +186,10 @@ class ValvePage:
         units, u_max_V, place = c.valve.recorded_units.of_side(SIDE_NAMES[sign]), float(c.u_max_V), int(sign < 0)
         span, chosen, unit = signals.command.span(sign), law(c.law), form.scale_beta * c.beta_denominator
         divisor, whole = form.divisor << form.shift, unit * c.beta_step_codes
+        pair = signals.pair(sign)
+        ahead_MPa, behind_MPa = float(pair.ahead.per_code_MPa), float(pair.behind.per_code_MPa)
+        ratio = f"{units.text(behind_MPa, '.6g MPa')} / {units.text(ahead_MPa, '.6g MPa')}"
+        ahead, behind = pair.names
 
         def volts(count: float, text: str) -> str:
             return units.text(count / divisor / signals.compare_max * u_max_V, text)
@@ -189,6 +217,8 @@ class ValvePage:
             "quotient_limit": units.text(self.block.compare_limit / signals.compare_max * u_max_V, ".4g V"),
             "reciprocal": f"1/{form.divisor << (form.shift - 32)}",
             "reciprocal_shift": f"2^{32 + numbers.reciprocal_shift}",
+            "balance": f"codes {pair.ahead.zero_code} of {ahead} and {pair.behind.zero_code} of {behind}",
+            "weight": f"{ratio} = {behind_MPa / ahead_MPa:.6g}",
             "tested_to": c.valve.recorded_units.text(float(side.certificate.dp_MPa[1]), ".4g MPa"),
             "beta_factor": f"2^15/{whole}",
             "beta_shift": f"2^{numbers.beta_shift}",
@@ -220,6 +250,7 @@ class ValvePage:
             "integral": f"{loop.integral / unit:.6g}",
             "feed_forward": f"{loop.feed_forward / unit:.6g}: R i over the supply",
             "offset_shift": f"{1 << loop.offset_shift} sums",
+            "held_ticks": "" if loop.held_ticks else "one solenoid",
             "supply_shift": f"{loop.supply.step_codes} codes" if loop.supply else "not measured",
         }
 

@@ -4,11 +4,19 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from dzdesign.codegen.calibration.acceptance import refusals
-from dzdesign.codegen.calibration.layout import NO_INTERLOCK, NO_RAMP, SHAPE_BITS, BuiltFor, CalibrationBlock, SideBlock
+from dzdesign.codegen.calibration.layout import (
+    NO_INTERLOCK,
+    NO_RAMP,
+    SHAPE_BITS,
+    BuiltFor,
+    CalibrationBlock,
+    SensorBlock,
+    SideBlock,
+)
 from dzdesign.codegen.calibration.packing import octets_of, text_of
 from dzdesign.core.errors import InputError
 from dzdesign.design.drive_functions import RAMP_UNIT
-from dzdesign.design.signals import SIDE_NAMES, WEIGHT_UNIT
+from dzdesign.design.signals import INPUT_NAMES, SIDE_NAMES, WEIGHT_UNIT
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,8 +94,7 @@ class CalibrationReading:
     sample_Hz: int
     tick_Hz: int
     command: CommandReading
-    pressure_a: SensorReading
-    pressure_b: SensorReading
+    pressures: dict[str, SensorReading]
     reverse_MPa: float
     drive: DriveReading
     sides: dict[str, SideReading]
@@ -100,8 +107,12 @@ def reading_of(block: CalibrationBlock, name: str) -> CalibrationReading:
 
     Numbers that no firmware accepts are an `InputError` that begins with `name`: in other units they mean nothing.
     """
-    _refuse_unaccepted(block, name)
-    scale = _Scale(block)
+    built = BuiltFor(
+        shape=block.shape, code_max=block.code_max, compare_max=block.compare_max, sample_Hz=block.sample_Hz,
+        tick_Hz=block.tick_Hz, beta_step=block.beta_step, samples=block.current.samples,
+    )  # fmt: skip
+    _refuse_unaccepted(block, built, name)
+    scale = _Scale(block, built)
     signs = (1, -1) if block.shape & 1 else (1,)
     of_current = list(SHAPE_BITS).index("CURRENT")
     current = block.current
@@ -123,11 +134,10 @@ def reading_of(block: CalibrationBlock, name: str) -> CalibrationReading:
             valid_codes=(block.command_low, block.command_high),
             codes={SIDE_NAMES[sign]: block.sides[sign < 0].span for sign in signs},
         ),
-        pressure_a=_sensor(block.a_span_Pa, (block.a_zero, block.a_full), (block.a_low, block.a_high)),
-        pressure_b=_sensor(block.b_span_Pa, (block.b_zero, block.b_full), (block.b_low, block.b_high)),
-        reverse_MPa=scale.dp_MPa(block.reverse),
+        pressures={name: _sensor(sensor) for name, sensor in zip(built.inputs, block.sensors, strict=False)},
+        reverse_MPa=scale.dp_MPa(block.reverse, 1),
         drive=_drive(block, scale),
-        sides={SIDE_NAMES[sign]: _side(block, block.sides[sign < 0], scale) for sign in signs},
+        sides={SIDE_NAMES[sign]: _side(block, sign, scale) for sign in signs},
         current={each: getattr(current, each) for each in current.__dataclass_fields__}
         if block.shape >> of_current & 1
         else None,
@@ -139,6 +149,7 @@ class _Scale:
     """From codes and counts of a block to V and MPa."""
 
     block: CalibrationBlock
+    built: BuiltFor
 
     @property
     def full_V(self) -> float:
@@ -150,10 +161,10 @@ class _Scale:
     def command_V(self, codes: int) -> float:
         return codes / self.block.sides[0].span * self.full_V
 
-    def dp_MPa(self, weighted: int) -> float:
-        """Return a pressure drop of weighted codes of sensor A."""
-        block = self.block
-        return weighted / WEIGHT_UNIT * block.a_span_Pa / 1e6 / (block.a_full - block.a_zero)
+    def dp_MPa(self, weighted: int, sign: int) -> float:
+        """Return a pressure drop of weighted codes of the sensor ahead."""
+        ahead = self.block.sensors[INPUT_NAMES.index(self.built.pair(sign)[0])]
+        return weighted / WEIGHT_UNIT * ahead.span_Pa / 1e6 / (ahead.full - ahead.zero)
 
     def ramp_s(self, side: SideBlock, step: int) -> float | None:
         if not self.block.ramps or step == NO_RAMP:
@@ -161,19 +172,17 @@ class _Scale:
         return side.span * RAMP_UNIT / step / self.block.sample_Hz
 
 
-def _refuse_unaccepted(block: CalibrationBlock, name: str) -> None:
+def _refuse_unaccepted(block: CalibrationBlock, built: BuiltFor, name: str) -> None:
     """Refuse numbers that the firmware of no compensator accepts."""
-    built = BuiltFor(
-        shape=block.shape, code_max=block.code_max, compare_max=block.compare_max, sample_Hz=block.sample_Hz,
-        tick_Hz=block.tick_Hz, beta_step=block.beta_step, samples=block.current.samples,
-    )  # fmt: skip
     wrong = [
         what
         for what, holds in {
             "shape": not block.shape >> len(SHAPE_BITS),
             "rates and counts": min(block.sample_Hz, block.tick_Hz, block.compare_max, block.code_max) > 0,
             "step of beta": block.beta_step.bit_count() == 1,
-            "codes of a sensor at its span": block.a_full > block.a_zero and block.b_full > block.b_zero,
+            "codes of a sensor at its span": all(
+                sensor.full > sensor.zero for _, sensor in zip(built.inputs, block.sensors, strict=False)
+            ),
         }.items()
         if not holds
     ]
@@ -186,8 +195,13 @@ def _refuse_unaccepted(block: CalibrationBlock, name: str) -> None:
         )
 
 
-def _sensor(span_Pa: int, codes: tuple[int, int], valid: tuple[int, int]) -> SensorReading:
-    return SensorReading(span_MPa=span_Pa / 1e6, zero_code=codes[0], full_code=codes[1], valid_codes=valid)
+def _sensor(sensor: SensorBlock) -> SensorReading:
+    return SensorReading(
+        span_MPa=sensor.span_Pa / 1e6,
+        zero_code=sensor.zero,
+        full_code=sensor.full,
+        valid_codes=(sensor.low, sensor.high),
+    )
 
 
 def _drive(block: CalibrationBlock, scale: _Scale) -> DriveReading:
@@ -206,21 +220,23 @@ def _drive(block: CalibrationBlock, scale: _Scale) -> DriveReading:
     )
 
 
-def _side(block: CalibrationBlock, side: SideBlock, scale: _Scale) -> SideReading:
+def _side(block: CalibrationBlock, sign: int, scale: _Scale) -> SideReading:
+    side = block.sides[sign < 0]
     return SideReading(
-        tested_to_MPa=scale.dp_MPa(side.tested_to // WEIGHT_UNIT * WEIGHT_UNIT),
+        tested_to_MPa=scale.dp_MPa(side.tested_to // WEIGHT_UNIT * WEIGHT_UNIT, sign),
         ramp_up_s=scale.ramp_s(side, side.ramp_up),
         ramp_down_s=scale.ramp_s(side, side.ramp_down),
         play_V=scale.output_V(max(side.play)),
-        nodes=tuple(_nodes(block, side, scale)),
+        nodes=tuple(_nodes(block, sign, scale)),
     )
 
 
-def _nodes(block: CalibrationBlock, side: SideBlock, scale: _Scale) -> Iterator[NodeReading]:
+def _nodes(block: CalibrationBlock, sign: int, scale: _Scale) -> Iterator[NodeReading]:
+    side = block.sides[sign < 0]
     for node in range(side.node_count):
         law, at_zero = side.nodes[2 * node : 2 * node + 2]
         yield NodeReading(
-            dp_MPa=scale.dp_MPa(node * block.beta_step * WEIGHT_UNIT),
+            dp_MPa=scale.dp_MPa(node * block.beta_step * WEIGHT_UNIT, sign),
             beta=law / side.beta_unit,
             beta_at_zero=at_zero / side.beta_unit,
             offset_V=scale.output_V(counts_at(block, side, node, 0)),

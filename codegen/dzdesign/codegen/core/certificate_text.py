@@ -36,7 +36,7 @@ def zero_command(compensator: Compensator, sign: int) -> tuple[int, int]:
     """Return the least and the largest compare value at zero command of one sign."""
     zero = compensator.signals.command.zero_code
     # Straight between nodes: the extremes stand at these, and at the largest difference, short of the last node.
-    last = compensator.signals.largest_difference(sign)
+    last = compensator.signals.pair(sign).largest_difference
     values = [compensator.compare(zero, code, sign) for code in (*range(0, last, compensator.beta_step_codes), last)]
     return min(values), max(values)
 

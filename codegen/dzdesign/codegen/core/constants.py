@@ -71,6 +71,8 @@ STATUS_BITS = {
     "DIFFERENCE": "valid pressures, but their drop too far below zero, so the smallest beta is used",
     "ABOVE": "pressure drop above the highest tested one: no fault, but no recording either",
 }
+#: The law's bit of a third pressure input.
+THIRD_BIT = {"PRESSURE_C": (9, "pressure C outside its valid codes, so the smallest beta is used where it counts")}
 #: Bits that the drive adds to those of the law, each with its place.
 DRIVE_BITS = {
     "WAITING": (5, "the drive waits: for valid commands, and with the interlock for zero command"),
@@ -87,11 +89,17 @@ FAULT_BITS = {
     "SHORT": "the current is beyond the converter's range",
     "OVER": "the current stayed above its limit",
 }
+#: The one that only two solenoids have; and by how many places those of solenoid B stand higher.
+HELD_BIT = {"HELD": "the current does not end as the other solenoid is asked for: the switch does not open"}
+OF_B = 8
 
 
-def status_constants() -> list[Define]:
-    """Return the bits of the law's status word."""
-    return [*_bits("DZ_STATUS", ((place, *each) for place, each in enumerate(STATUS_BITS.items())), "the status word")]
+def status_constants(inputs: str) -> list[Define]:
+    """Return the bits of the law's status word, for the pressure inputs of these names."""
+    bits = {name: (place, text) for place, (name, text) in enumerate(STATUS_BITS.items())} | THIRD_BIT
+    if "C" not in inputs:
+        bits.pop(*THIRD_BIT)
+    return [*_bits("DZ_STATUS", ((place, name, text) for name, (place, text) in bits.items()), "the status word")]
 
 
 def drive_status_constants(*, block: bool) -> list[Define]:
@@ -101,9 +109,15 @@ def drive_status_constants(*, block: bool) -> list[Define]:
                    "the drive's status word")]  # fmt: skip
 
 
-def current_fault_bits() -> list[Define]:
+def current_faults(*, two: bool) -> dict[str, str]:
+    """Return the faults of a controller of one solenoid, or of two, in the order of their bits."""
+    return FAULT_BITS | (HELD_BIT if two else {})
+
+
+def current_fault_bits(*, two: bool) -> list[Define]:
     """Return the bits of the controller's word of faults."""
-    return [*_bits("DZ_CURRENT", ((place, *each) for place, each in enumerate(FAULT_BITS.items())), "the faults")]
+    bits = enumerate(current_faults(two=two).items())
+    return [*_bits("DZ_CURRENT", ((place, *each) for place, each in bits), "the faults")]
 
 
 def difference_place() -> Define:

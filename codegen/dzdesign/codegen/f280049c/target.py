@@ -109,7 +109,7 @@ PROJECT = {
 }
 
 
-def on_board(crystal_hz: int | None = None, channels: Sequence[str] = ()) -> Target:
+def on_board(crystal_hz: int | None = None, channels: Sequence[str] = (), inputs: Sequence[str] = ()) -> Target:
     """Return the target on a declared board, see `Target.on_board`."""
     if crystal_hz:
         raise InputError("--crystal is for target f28335: the clock of f280049c is that of TI's device.h; leave it out")
@@ -119,6 +119,7 @@ def on_board(crystal_hz: int | None = None, channels: Sequence[str] = ()) -> Tar
         {**timing(), **converter(), **PROJECT},
         known_channels=CHANNELS_OF_PINS,
         channels=channels,
+        inputs=inputs,
         converter=Converter(
             full_V=ADC_SPAN_V,
             levels=2**ADC_BITS,

@@ -50,7 +50,7 @@ LINE_LOAD_MAX = Fraction(1, 2)
 # 8 bits take several instructions where the C28x takes one.
 FRAME_CYCLES = 6_000
 #: The most that dz_calibration_check() takes on a Cortex-M4, of two solenoids with an inverse play.
-CHECK_INSTRUCTIONS = 35_500
+CHECK_INSTRUCTIONS = 36_000
 #: An access to flash at 150 MHz: five wait states, as C2000Ware's InitFlash() sets them; and what an instruction of the
 #: check of a block is given.
 FLASH_CYCLES, CHECK_CYCLES = 6, 8
@@ -225,7 +225,7 @@ PROJECT = {
 }
 
 
-def on_board(declared_hz: int | None = None, channels: Sequence[str] = ()) -> Target:
+def on_board(declared_hz: int | None = None, channels: Sequence[str] = (), inputs: Sequence[str] = ()) -> Target:
     """Return the target on a declared board, see `Target.on_board`."""
     crystal_hz = declared_hz or CRYSTAL_HZ
     figures = {**timing(crystal_hz), **converter(sysclkout(crystal_hz)), **serial_line(sysclkout(crystal_hz))}
@@ -236,6 +236,7 @@ def on_board(declared_hz: int | None = None, channels: Sequence[str] = ()) -> Ta
         converter=Converter(full_V=Fraction(ADC_SPAN_V), levels=2**ADC_BITS),
         known_channels=CHANNELS_OF_PINS,
         channels=channels,
+        inputs=inputs,
         crystal_hz=declared_hz,
         sources=("dz_telemetry.c", "dz_telemetry.h", "dz_frame.c", "dz_frame.h"),
         block_sources=("dz_active.c", "dz_active.h"),

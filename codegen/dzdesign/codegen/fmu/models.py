@@ -15,6 +15,8 @@ from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.pressure_inputs import what_machine_switches
+from dzdesign.design.signals import SIDE_NAMES
 
 #: Of a default experiment, s.
 STOP_S, PLANT_STOP_S = 10.0, 1.0
@@ -56,7 +58,8 @@ def compensator_model(compensator: Compensator) -> Model:
     return Model(
         identifier="dz_compensator",
         title="dzdesign compensator",
-        description=f"Dead-zone compensator of a proportional valve, law {compensator.law}: the firmware's integers.",
+        description=f"Dead-zone compensator of a proportional valve, law {compensator.law}: the firmware's integers. "
+        f"{what_machine_switches(compensator)}".strip(),
         variables=_compensator_variables(compensator),
         exchange=True,
         step_s=1 / compensator.signals.tick_Hz,
@@ -88,15 +91,16 @@ def _compensator_variables(compensator: Compensator) -> tuple[Variable, ...]:
     c, table = compensator, _Table()
     signals, command, add = c.signals, c.signals.command, table.add
     u_max, two = float(c.u_max_V), len(signals.signs) == 2
-    inputs = ("u_i", "p_A", "p_B", "u_i_code", "p_A_code", "p_B_code")
+    names = [f"p_{name}" for name in signals.pressures]
+    inputs = ("u_i", *names, "u_i_code", *(f"{name}_code" for name in names))
     add("u_i", f"Command, {-u_max if two else 0.0:g} to {u_max:g} V.", "input", unit="V", start=0.0, command=True)
-    add("p_A", "Pressure ahead of the metering edge, for positive command.", "input", unit="MPa", start=0.0)
-    add("p_B", "Pressure behind it.", "input", unit="MPa", start=0.0)
-    for name, what, zero in (
-        ("u_i_code", "command", command.zero_code),
-        ("p_A_code", "pressure sensor A", signals.pressure_a.zero_code),
-        ("p_B_code", "pressure sensor B", signals.pressure_b.zero_code),
-    ):
+    for name in signals.pressures:
+        add(f"p_{name}", f"Pressure {_of_edges(compensator, name)}.", "input", unit="MPa", start=0.0)
+    codes = {"u_i_code": ("command", command.zero_code)}
+    codes |= {
+        f"p_{name}_code": (f"pressure sensor {name}", sensor.zero_code) for name, sensor in signals.pressures.items()
+    }
+    for name, (what, zero) in codes.items():
         add(name, f"Converter code of the {what}, where codes is true.", "input", kind="integer",
             start=float(zero), range=(0.0, LARGEST_CODE))  # fmt: skip
     add("codes", "True: the inputs are the converter's codes; false: V and MPa, which an ideal converter reads.",
@@ -109,7 +113,9 @@ def _compensator_variables(compensator: Compensator) -> tuple[Variable, ...]:
         recorded = unit == "V" and (sign > 0 or c.valve.recorded_units.command.at_zero == 0)
         add(f"u_O{end}", f"{what}{side}: compare{end} in {unit}, {full:g} {unit} at {signals.compare_max}.", "output",
             unit=unit, follows=inputs, command=recorded)  # fmt: skip
-        add(f"beta{end}", f"Beta that the law uses{side}.", "output", follows=inputs[1:3] + inputs[4:])
+        own = [f"p_{name}" for name in signals.pair(sign).names]
+        read = (*own, "u_i_code", *(f"{name}_code" for name in own))
+        add(f"beta{end}", f"Beta that the law uses{side}.", "output", follows=tuple(n for n in inputs if n in read))
         add(f"compare{end}", f"PWM compare value of the law{side}, of {signals.compare_max}; changes at events.",
             "output", kind="integer", follows=inputs)  # fmt: skip
         add(f"status{end}", f"What there is to say of the inputs{side}, DZ_STATUS_... of dz_comp.h.", "output",
@@ -120,6 +126,18 @@ def _compensator_variables(compensator: Compensator) -> tuple[Variable, ...]:
     add("drive_status", "What the drive says of its inputs, DZ_STATUS_... of dz_drive.h; 0: all valid, and used.",
         "output", kind="integer")  # fmt: skip
     return tuple(table.variables)
+
+
+def _of_edges(compensator: Compensator, name: str) -> str:
+    """Say of which sides' edges a pressure is ahead or behind."""
+    signals = compensator.signals
+    found = [
+        f"{place} the metering edge at {SIDE_NAMES[sign]} commands"
+        for sign in signals.signs
+        for place, each in zip(("ahead of", "behind"), signals.pair(sign).names, strict=True)
+        if each == name
+    ]
+    return ", ".join(found)
 
 
 def _full_output(compensator: Compensator) -> tuple[str, float]:
@@ -139,9 +157,7 @@ def _compensator_values(compensator: Compensator) -> Mapping[str, object]:
     def per_MPa(zero: int, full: int, span: float) -> str:
         return repr((full - zero + 1) / span)
 
-    a, b = signals.pressure_a, signals.pressure_b
     return {
-        "suffixes": ["" if sign > 0 else "_negative" for sign in signals.signs],
         "bipolar": len(signals.signs) == 2,
         "tick_Hz": signals.tick_Hz,
         "ticks_per_sample": signals.tick_Hz // signals.sample_Hz,
@@ -152,10 +168,15 @@ def _compensator_values(compensator: Compensator) -> Mapping[str, object]:
         "command_zero": command.zero_code,
         "positive_codes": codes(1),
         "negative_codes": codes(-1) if len(signals.signs) == 2 else "",
-        "a_zero": a.zero_code,
-        "a_codes": per_MPa(a.zero_code, a.full_code, float(a.span_MPa)),
-        "b_zero": b.zero_code,
-        "b_codes": per_MPa(b.zero_code, b.full_code, float(b.span_MPa)),
+        # By the name of the input: code without pressure, and codes per MPa.
+        "pressures": {
+            name: (sensor.zero_code, per_MPa(sensor.zero_code, sensor.full_code, float(sensor.span_MPa)))
+            for name, sensor in signals.pressures.items()
+        },
+        "sides": {
+            "" if sign > 0 else "_negative": ", ".join(f"codes.{name.lower()}" for name in signals.pair(sign).names)
+            for sign in signals.signs
+        },
     }
 
 

@@ -12,7 +12,7 @@ from math import ceil, floor
 
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.signals import WEIGHT_UNIT, PressureSignal
+from dzdesign.design.signals import WEIGHT_UNIT, InputPair, PressureSignal
 
 #: Units of a PLC: 0.01 % of full command and of full drive, and 0.1 bar.
 FULL = 10_000
@@ -22,12 +22,11 @@ DINT_MAX = 2**31 - 1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pressure:
-    """One pressure input: first and last valid number, the number of no pressure, and its weight in a difference."""
+    """One pressure input: first and last valid number, and the number of no pressure."""
 
     low: int
     high: int
     zero: int
-    weight: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,8 +39,11 @@ class SideScaling:
     transition: int
     #: The command must pass this to leave zero command, or to change the side.
     leave_zero: int
-    #: 1: the pressure drop is A minus B.
-    turn: int
+    #: Names of the pressure inputs ahead and behind, and what one number behind weighs, over `weight_unit`.
+    pair: InputPair
+    weight: int
+    #: Codes of the design in one unit of the pressure drop.
+    codes_per_unit: Fraction
     #: Largest pressure drop that was tested, and the largest code of the tables.
     tested_to: int
     last_code: int
@@ -58,14 +60,11 @@ class Interface:
     command_zero: int
     #: 1: positive commands have larger numbers than zero command, -1: smaller ones.
     command_direction: int
-    a: Pressure
-    b: Pressure
+    pressures: Mapping[str, Pressure]
     #: A difference of weighted pressures over this, rounded down, is the pressure drop.
     weight_unit: int
     #: A pressure drop below the negative of this can't be right.
     reverse: int
-    #: Codes of the design in one unit of the pressure drop.
-    codes_per_unit: Fraction
     #: A pressure drop that is read stands for all within so many units of it.
     resolution: int
     #: Output of full drive, and its limit.
@@ -79,23 +78,36 @@ class Interface:
 def interface_named(name: str, compensator: Compensator) -> Interface:
     """Return the scaling of an interface, ``plc`` or ``codes``, for a compensator."""
     signals, functions = compensator.signals, compensator.drive_functions
-    command, a, b = signals.command, signals.pressure_a, signals.pressure_b
-    of_codes, full = name == "codes", signals.compare_max if name == "codes" else FULL
-    pressure_unit = a.per_code_MPa if of_codes else PRESSURE_MPa
-    reverse = floor(compensator.reverse_codes * a.per_code_MPa / pressure_unit)
-    weights = (1, 1) if not of_codes or signals.like_sensors else (WEIGHT_UNIT, signals.weight_b)
-    pressures = [
-        Pressure(low=each.valid_codes[0], high=each.valid_codes[1], zero=each.zero_code, weight=weight)
+    command, of_codes, full = signals.command, name == "codes", signals.compare_max if name == "codes" else FULL
+    pairs = {sign: signals.pair(sign) for sign in signals.signs}
+    reverse = compensator.reverse_codes
+    if not of_codes:
+        reverse = floor(reverse * min(pair.ahead.per_code_MPa for pair in pairs.values()) / PRESSURE_MPa)
+    unit = 1 if not of_codes or all(pair.like_sensors for pair in pairs.values()) else WEIGHT_UNIT
+    pressures = {
+        name: Pressure(low=each.valid_codes[0], high=each.valid_codes[1], zero=each.zero_code)
         if of_codes
         else _pressure(each, reverse)
-        for each, weight in zip((a, b), weights, strict=True)
-    ]
+        for name, each in signals.pressures.items()
+    }
     low, high = command.valid_codes if of_codes else (-FULL, FULL)
-    largest = max(pressures[0].high - pressures[1].low, pressures[1].high - pressures[0].low)
 
     def units(codes: int, sign: int) -> int:
         """Return codes of command in units of the interface, rounded up."""
         return codes if of_codes else ceil(Fraction(codes * FULL, command.span(sign)))
+
+    def per_unit(sign: int) -> Fraction:
+        """Return the codes in a unit of the pressure drop."""
+        if of_codes:
+            return Fraction(1)
+        ahead, behind = (pressures[each] for each in pairs[sign].names)
+        largest = max(ahead.high - behind.low, behind.high - ahead.low)
+        return _codes_per_unit(pairs[sign].ahead.per_code_MPa, largest)
+
+    def tested_to(sign: int) -> int:
+        """Return the largest tested pressure drop, in units of it."""
+        last_MPa = compensator.side(sign).certificate.dp_MPa[1]
+        return floor(last_MPa / (pairs[sign].ahead.per_code_MPa if of_codes else PRESSURE_MPa))
 
     return Interface(
         name=name,
@@ -103,11 +115,9 @@ def interface_named(name: str, compensator: Compensator) -> Interface:
         command_high=high,
         command_zero=command.zero_code if of_codes else 0,
         command_direction=command.direction(1) if of_codes else 1,
-        a=pressures[0],
-        b=pressures[1],
-        weight_unit=weights[0],
+        pressures=pressures,
+        weight_unit=unit,
         reverse=reverse,
-        codes_per_unit=Fraction(1) if of_codes else _codes_per_unit(a.per_code_MPa, largest),
         resolution=0 if of_codes else 1,
         full=full,
         limit=full * functions.compare_limit // signals.compare_max,
@@ -118,9 +128,11 @@ def interface_named(name: str, compensator: Compensator) -> Interface:
                 zero_band=units(compensator.zero_band_codes, sign),
                 transition=units(compensator.transition_codes, sign),
                 leave_zero=units(functions.leave_zero_codes, sign),
-                turn=-1 if sign < 0 and signals.swapped else 1,
-                tested_to=floor(compensator.side(sign).certificate.dp_MPa[1] / pressure_unit),
-                last_code=signals.largest_difference(sign),
+                pair=pairs[sign].names,
+                weight=pairs[sign].weight if unit > 1 else 1,
+                codes_per_unit=per_unit(sign),
+                tested_to=tested_to(sign),
+                last_code=pairs[sign].largest_difference,
             )
             for sign in signals.signs
         },
@@ -133,14 +145,14 @@ def _pressure(signal: PressureSignal, reverse: int) -> Pressure:
     A converter that reads zero at no pressure reads it below, too: there a PLC may read as much less as is noise.
     """
     low, high = ((code - signal.zero_code) * signal.per_code_MPa / PRESSURE_MPa for code in signal.valid_codes)
-    return Pressure(low=ceil(low) if signal.valid_codes[0] else -reverse, high=floor(high), zero=0, weight=1)
+    return Pressure(low=ceil(low) if signal.valid_codes[0] else -reverse, high=floor(high), zero=0)
 
 
 def _codes_per_unit(per_code_MPa: Fraction, largest: int) -> Fraction:
     codes = PRESSURE_MPa / per_code_MPa
     if (largest + 1) * codes.numerator + codes.denominator > DINT_MAX:
         raise InputError(
-            f"a pressure of 0.1 bar is {codes} codes of sensor A, which needs more than 32 bits; give --pressure-span "
-            "fewer digits, or take --interface codes"
+            f"a pressure of 0.1 bar is {codes} codes of the sensor ahead, which needs more than 32 bits; give "
+            "--pressure-span fewer digits, or take --interface codes"
         )
     return codes

@@ -22,6 +22,8 @@ from dzdesign.design.signals import CODE_LIMIT
 #: Function of each sign of command.
 FUNCTIONS = {1: "dz_comp", -1: "dz_comp_negative"}
 DINT = 2**31
+#: Bit of the status of a third pressure.
+PRESSURE_C = 512
 LINEAR, HALF = "what the law takes of the command alone", "half a unit of the output, for it is rounded"
 #: Bits of the sum that are dropped at most: in limbs of 15 bits, two of them and one bit less than a third.
 MOST_DROPPED = 44
@@ -95,46 +97,61 @@ class _Law:
             inside = inside - zero if direction > 0 else zero - inside
         return valid, self.form.let("away", valid.choose(inside, 0), "command from zero on")
 
-    def pressures(
-        self, valid: Node, pressure_a: Node, pressure_b: Node, turned: Node | None = None
-    ) -> tuple[Node, Node]:
-        """Return the pressure drop, and whether the pressures can't be right; say in `status` what is not valid."""
-        interface, failed, found = self.interface, [], []
-        for name, signal, given in (("A", interface.a, pressure_a), ("B", interface.b, pressure_b)):
+    def pressures(self, valid: Node, given: Mapping[str, Node], negative: Node | None = None) -> tuple[Node, Node]:
+        """Return the pressure drop, and whether the pressures can't be right; say in `status` what is not valid.
+
+        The pressures that are `given` are all that the sides read; `negative` says which side is driven.
+        """
+        interface, failed, found = self.interface, dict[str, Node](), dict[str, Node]()
+        for name, pressure in given.items():
+            signal = interface.pressures[name]
             low = self.one(f"PRESSURE_{name}_LOW", signal.low, f"lowest valid pressure {name}")
             high = self.one(f"PRESSURE_{name}_HIGH", signal.high, f"highest valid pressure {name}")
-            failed.append(self.form.let(f"{name.lower()}_failed", (given < low) | (given > high),
-                                        f"pressure {name}: 1 where it is not valid"))  # fmt: skip
-            value = given.most(low).least(high)
+            failed[name] = self.form.let(f"{name.lower()}_failed", (pressure < low) | (pressure > high),
+                                         f"pressure {name}: 1 where it is not valid")  # fmt: skip
+            value = pressure.most(low).least(high)
             if signal.zero:
                 value -= self.one(f"PRESSURE_{name}_ZERO", signal.zero, f"no pressure at sensor {name}")
-            if signal.weight != 1:
-                weight = f"what a number of {name} weighs in the difference"
-                value *= self.one(f"PRESSURE_{name}_WEIGHT", signal.weight, weight)
-            found.append(value)
-        a, b = found
-        difference = b - a if self.signs == (-1,) and self.sides[-1].turn < 0 else a - b
-        unit = interface.weight_unit
-        told = f"pressure drop, A minus B{f', times {unit}' if unit != 1 else ''}"
-        difference = self.form.let("difference", difference, told)
-        if turned is not None:
-            difference = self.form.let("drop", turned.choose(-difference, difference), "of the driven side")
+            found[name] = value
+        (ahead, behind), unit = self._of_driven(found, negative, "pressure"), interface.weight_unit
+        if unit != 1:
+            weights = {sign: side.weight for sign, side in self.sides.items()}
+            ahead *= self.one("WEIGHT_AHEAD", unit, "what a number ahead weighs in the difference")
+            behind *= self.each("WEIGHT_BEHIND", weights, "what a number behind weighs in it")
+        drops = " or ".join(dict.fromkeys(" minus ".join(side.pair) for side in self.sides.values()))
+        told = f"pressure drop, {drops}{f', times {unit}' if unit != 1 else ''}"
+        difference = self.form.let("difference", ahead - behind, told)
         reverse = self.one("REVERSE", interface.reverse * unit, "a pressure drop below minus this: a failed sensor")
         tested = self.each("TESTED_TO", {s: (side.tested_to + 1) * unit - 1 for s, side in self.sides.items()},
                            f"largest tested pressure drop{f', times {unit}' if unit != 1 else ''}")  # fmt: skip
-        sound = self.form.let("sound", ~(failed[0] | failed[1]), "1 where both pressures are valid")
+        one, other = self._of_driven(failed, negative, "failure")
+        sound = self.form.let("sound", ~(one | other), "1 where both pressures of the drop are valid")
         below = self.form.let("below", sound & (difference < -reverse), "1 where the drop is too far below zero")
         above = sound & (difference > tested)
         status = (~valid).as_number()
-        for place, fault in enumerate((*failed, below, above), 1):
-            status = status + fault.as_number() * 2**place
+        for place, fault in enumerate((failed.get("A"), failed.get("B"), below, above), 1):
+            status = status + fault.as_number() * 2**place if fault else status
+        if "C" in failed:
+            status = status + failed["C"].as_number() * PRESSURE_C
         self.form.let("status", status)
         implausible = self.form.let("failed", ~sound | below, "1 where the pressures can't be right: least beta")
         dp = difference.most(0)
         if unit != 1:
-            told = "codes of sensor A, rounded down"
+            told = "codes of the sensor ahead, rounded down"
             dp = self.form.let("dp", dp.over(unit), told)
         return dp, implausible
+
+    def _of_driven(self, each: Mapping[str, Node], negative: Node | None, what: str) -> list[Node]:
+        """Return what belongs to the inputs ahead and behind: of the driven side, where the two sides' differ."""
+        found = []
+        for place, end in enumerate(("ahead", "behind")):
+            names = list(dict.fromkeys(self.sides[sign].pair[place] for sign in self.signs))
+            node = each[names[0]]
+            if negative is not None and len(names) > 1:
+                chosen = negative.choose(each[names[1]], node)
+                node = self.form.let(f"{what}_{end}", chosen, f"{end} the edge of the driven side")
+            found.append(node)
+        return found
 
     def betas(self, dp: Node, failed: Node) -> list[Node]:
         """Return beta of the law, and with a transition the certified one at zero command."""
@@ -191,9 +208,11 @@ class _Law:
         """
         if self.interface.resolution == 0:
             return [("", dp, "codes of the pressure drop")]
-        ratio, reach = self.interface.codes_per_unit, self.interface.resolution
-        codes = self.one("CODES", ratio.numerator, "so many codes of pressure drop are")
-        units = self.one("UNITS", ratio.denominator, "so many units of the inputs")
+        ratios, reach = {sign: side.codes_per_unit for sign, side in self.sides.items()}, self.interface.resolution
+        numerators, denominators = ({sign: getattr(each, part) for sign, each in ratios.items()}
+                                    for part in ("numerator", "denominator"))  # fmt: skip
+        codes = self.each("CODES", numerators, "so many codes of pressure drop are")
+        units = self.each("UNITS", denominators, "so many units of the inputs")
         upper = ((dp + reach) * codes + (units - 1)).quotient(units)
         found = [("", upper, "code at the upper end of what the pressure drop stands for")]
         tables = [self.numbers[sign].table[:-2] for sign in self.signs]
@@ -280,7 +299,8 @@ class _Block(_Law):
     def traced(self) -> Form:
         """Return the operations."""
         form, both = self.form, len(self.signs) == 2
-        command, a, b = (form.input(name, -DINT, DINT - 1) for name in ("command", "pressure_a", "pressure_b"))
+        command = form.input("command", -DINT, DINT - 1)
+        given = {name: form.input(f"pressure_{name.lower()}", -DINT, DINT - 1) for name in self.interface.pressures}
         form.heading("Command, from zero on; zero where it is not valid.")
         valid, away = self.command(command)
         towards, negative, driven = self._side(valid, away) if both else (away, None, valid)
@@ -293,8 +313,7 @@ class _Block(_Law):
             at_rest = form.let("at_rest", rests, "whether the command counts as zero")
             towards = form.let("asked", at_rest.choose(0, towards), "command that the law is given")
         form.heading("Pressure drop; where it can't be right the smallest beta is taken.")
-        turns = any(side.turn < 0 for side in self.sides.values())
-        dp, failed = self.pressures(valid, a, b, negative if turns else None)
+        dp, failed = self.pressures(valid, given, negative)
         form.heading("Eq. (7), beta: straight between its nodes.")
         betas = self.betas(dp, failed)
         form.heading("The law: a sum of products, in limbs of 15 bits.")
@@ -330,13 +349,14 @@ class _Function(_Law):
     def traced(self) -> Form:
         """Return the operations."""
         form, (sign,) = self.form, self.signs
-        u, p_a, p_b = (form.input(name, 0, CODE_LIMIT) for name in ("u", "p_a", "p_b"))
+        u = form.input("u", 0, CODE_LIMIT)
+        given = {name: form.input(f"p_{name.lower()}", 0, CODE_LIMIT) for name in self.sides[sign].pair}
         form.heading("Command, in codes from zero on; zero where it is not valid.")
         valid, away = self.command(u)
         span = self.side_field("COMMAND_SPAN", "span", "full command, from zero on")
         towards = form.let("towards", away.most(0).least(span), "command towards this side")
         form.heading("Pressure drop; where it can't be right the smallest beta is taken.")
-        dp, failed = self.pressures(valid, p_a, p_b)
+        dp, failed = self.pressures(valid, given)
         form.heading("Eq. (7), beta: straight between its nodes.")
         betas = self.betas(dp, failed)
         form.heading("The law.")

@@ -1,15 +1,17 @@
 """`output_files`: a compensator in; dz_comp.m, the script for Simulink's C Caller block and its C, out."""
 
 from collections.abc import Mapping
+from textwrap import wrap
 
 from dzdesign.codegen.core.certificate_text import certificate_lines, zero_command
-from dzdesign.codegen.integers.law import FUNCTIONS, function_form
+from dzdesign.codegen.integers.law import FUNCTIONS, PRESSURE_C, function_form
 from dzdesign.codegen.integers.plc import left_out_of
-from dzdesign.codegen.integers.text import matlab_body, matlab_constants, rendered
+from dzdesign.codegen.integers.text import COLUMNS, matlab_body, matlab_constants, rendered
 from dzdesign.codegen.project import generate
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareOrigin
+from dzdesign.design.pressure_inputs import what_machine_switches
 
 TEMPLATE, SETUP = "dz_comp.m.jinja", "setup_c_caller.m"
 #: The library for a PC: it takes the scalings of any compensator.
@@ -53,13 +55,16 @@ def law_function(compensator: Compensator, digest: str, sign: int) -> str:
         name=FUNCTIONS[sign],
         side_text=side,
         signals=signals,
+        pair=signals.pair(sign),
+        switched=wrap(what_machine_switches(compensator), COLUMNS - 4) if sign < 0 else [],
+        status_bits={"A": 2, "B": 4, "C": PRESSURE_C},
         full_code=signals.command.full_code if sign > 0 else signals.command.negative_full_code,
         u_max=units.of_controller.text(float(compensator.u_max_V) * sign, "g V"),
         limit=compensator.drive_functions.compare_limit,
         at_zero=zero_command(compensator, sign),
         certificate=certificate_lines(compensator, sign),
         step_codes=compensator.beta_step_codes,
-        step_text=units.text(float(signals.dp_MPa(compensator.beta_step_codes)), ".4f MPa"),
+        step_text=units.text(float(signals.pair(sign).dp_MPa(compensator.beta_step_codes)), ".4f MPa"),
         zero_band=compensator.zero_band_codes,
         transition=compensator.transition_codes,
         constants=matlab_constants(form),

@@ -20,6 +20,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.core.version import __version__
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareOrigin
+from dzdesign.design.pressure_inputs import what_machine_switches
 from dzdesign.design.signals import SIDE_NAMES
 
 NAME = "FB_DeadZone"
@@ -72,6 +73,9 @@ def structured_text(compensator: Compensator, digest: str, interface_name: str, 
         first=FIRST_VALUES,
         command_text="converter code of the command" if of_codes else "0.01 % of full command, -10000 to 10000",
         pressure_text="codes of the pressures" if of_codes else "0.1 bar",
+        pressures=", ".join(f"pressure_{name.lower()}" for name in interface.pressures),
+        edges=_edges(interface),
+        three="C" in interface.pressures,
         output_text=f"compare value, full duty {interface.full}" if of_codes else "0.01 % of full drive",
         constants=st_constants(form),
         variables=st_variables(form),
@@ -91,6 +95,7 @@ def _header(compensator: Compensator, interface: Interface) -> list[str]:
     else:
         lines.append("Codes and compare values are those of the C, number for number.")
     lines += wrap(_certificate(compensator), COLUMNS - 3)
+    lines += wrap(what_machine_switches(compensator), COLUMNS - 3)
     left_out = "Not in it: current control and telemetry"
     if chosen := left_out_of(compensator):
         left_out += f"; nor, though this design has them: {', '.join(chosen)}"
@@ -110,6 +115,14 @@ def _certificate(compensator: Compensator) -> str:
     text = f"At zero command the output lies below {', and below '.join(parts)}, of {compensator.certified_of}."
     lot = lot_in_words(compensator)
     return f"{text} {lot.banner}" if lot else text
+
+
+def _edges(interface: Interface) -> str:
+    """Say which pressures are ahead of and behind the metering edge of each side."""
+    sides = {SIDE_NAMES[sign]: side.pair for sign, side in interface.sides.items()}
+    if len(set(sides.values())) == 1:
+        return "{} ahead of and {} behind the metering edge".format(*next(iter(sides.values())))
+    return ", ".join(f"{ahead} ahead and {behind} behind at {side} commands" for side, (ahead, behind) in sides.items())
 
 
 def left_out_of(compensator: Compensator) -> list[str]:

@@ -20,7 +20,7 @@ from dzdesign.codegen.core.integer_form import exact_factors
 from dzdesign.core.errors import InputError
 
 SYNC = 0xA55A
-VERSION = 2
+VERSION = 3
 CRC_POLYNOMIAL, CRC_START = 0x1021, 0xFFFF
 HEADER_OCTETS, CRC_OCTETS = 4, 2
 #: A start bit, eight of data, a stop bit.
@@ -48,6 +48,7 @@ class Frame:
     u_adc: Annotated[int, Number(bits=16, text="code of the command")]
     p_a_adc: Annotated[int, Number(bits=16, text="code of pressure A")]
     p_b_adc: Annotated[int, Number(bits=16, text="code of pressure B")]
+    p_c_adc: Annotated[int, Number(bits=16, text="code of pressure C; 0 without one")]
     beta: Annotated[int, Number(bits=16, text="beta(dP) times 2^15, rounded down")]
     compare_a: Annotated[int, Number(bits=16, text="PWM compare value of solenoid A")]
     compare_b: Annotated[int, Number(bits=16, text="of solenoid B; one of the two is 0")]

@@ -6,7 +6,7 @@ The file is written as the frames come: whatever ends it, what was recorded unti
 import contextlib
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -32,7 +32,12 @@ from dzdesign.design.firmware_manifest import FirmwareManifest
 SYNC_S = 1.0
 #: Windows writes CR before each line feed otherwise.
 BINARY = getattr(os, "O_BINARY", 0)
-COLUMNS = ("time_s", "u_V", "pA_MPa", "pB_MPa", "uO_V", "beta", "compare_a", "compare_b", "status")
+OUTPUT_COLUMNS = ("uO_V", "beta", "compare_a", "compare_b", "status")
+#: Ports that pressures A, B and C are of, where there are three, by the inputs of negative commands; two are of any.
+PORTS: Mapping[str, tuple[str, ...]] = {
+    "AC": ("pP", "pA", "pB"), "CB": ("pB", "pT", "pA"), "BC": ("pP", "pA", "pT"), "CA": ("pB", "pT", "pP")
+}  # fmt: skip
+TWO_PORTS = ("pA", "pB")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,6 +69,12 @@ def scalings_of(folder: Path, compensator_file: Path | None = None) -> Scalings:
     content = read_bytes(source, "compensator file")
     compensator = read_artefact(content, Compensator, str(source))
     return Scalings(link=target.link, compensator=compensator, sha256=sha256_of(content))
+
+
+def columns_of(compensator: Compensator) -> tuple[str, ...]:
+    """Return the columns of a recording, the pressures by the ports that they are of."""
+    ports = PORTS.get(compensator.signals.negative_pair, TWO_PORTS)
+    return ("time_s", "u_V", *(f"{port}_MPa" for port in ports), *OUTPUT_COLUMNS)
 
 
 class Recording:
@@ -114,14 +125,17 @@ class Recording:
 
     def _line(self, frame: Frame) -> str:
         u_max_V, signals = self.scalings.compensator.u_max_V, self.scalings.compensator.signals
-        command, a, b = signals.command, signals.pressure_a, signals.pressure_b
+        command = signals.command
         volts, volts_out = float(command.direction(1) * u_max_V / command.span(1)), float(u_max_V / signals.compare_max)
         out = (frame.compare_a - frame.compare_b) * volts_out if frame.status & STATUS_RELEASED else 0.0
         volts_in = (frame.u_adc - command.zero_code) * volts
-        a_now = (frame.p_a_adc - a.zero_code) * float(a.per_code_MPa)
-        b_now = (frame.p_b_adc - b.zero_code) * float(b.per_code_MPa)
+        codes = (frame.p_a_adc, frame.p_b_adc, frame.p_c_adc)
+        pressures = ",".join(
+            f"{(code - sensor.zero_code) * float(sensor.per_code_MPa):.5f}"
+            for code, sensor in zip(codes, signals.pressures.values(), strict=False)
+        )
         return (
-            f"{self.duration_s:.4f},{volts_in:.5f},{a_now:.5f},{b_now:.5f},{out:.5f},"
+            f"{self.duration_s:.4f},{volts_in:.5f},{pressures},{out:.5f},"
             f"{frame.beta / (1 << BETA_BITS):.5f},{frame.compare_a},{frame.compare_b},{frame.status}\n"
         )
 
@@ -137,7 +151,8 @@ class Recording:
             "The firmware does not measure the flow: add a column Q_Lmin, your flow meter's reading at each time_s. "
             "The ramp of u_V, recorded by both, tells the shift between the two clocks",
         )
-        return "".join(f"# {comment}\n" for comment in comments) + ",".join(COLUMNS) + "\n"
+        columns = ",".join(columns_of(self.scalings.compensator))
+        return "".join(f"# {comment}\n" for comment in comments) + f"{columns}\n"
 
     def foot(self, reader: FrameReader) -> str:
         """Return what stands after the last line: what was recorded, and what `reader` missed."""

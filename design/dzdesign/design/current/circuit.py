@@ -223,6 +223,12 @@ class CurrentLoop:
     """Compare value from which a current is expected."""
     open_ticks: Annotated[int, Meta(ge=1, le=65535)]
     """Consecutive PWM periods without an expected current that make a fault."""
+    held_ticks: Count = 0
+    """Consecutive PWM periods with a current after the other solenoid was asked for that make a fault; 0 with one
+    solenoid."""
+    shunts: Annotated[int, Meta(ge=1, le=2)] = 1
+    """Number of shunts: 1 if the current of either solenoid passes the same one. Of two that of the solenoid in use is
+    sampled."""
     supply: SupplyCorrection | None = None
     """Correction for the supply voltage, if it is measured."""
 
@@ -234,6 +240,8 @@ class CurrentLoop:
                 f"the sensor's range is {self.largest_current} counts of current, expected at most {LARGEST_ERROR}: "
                 "one and a half times the rated current of 60000 counts"
             )
+        if self.shunts not in (1, 2):
+            raise RuleError(f"shunts is {self.shunts}, expected 1 or 2")
         if self.integral_limit << self.gain_shift > 65535 * 8192:
             raise RuleError("the integral's limit and the gains' binary places need more than 31 bits")
         if self.release > self.integral_limit:
@@ -242,9 +250,19 @@ class CurrentLoop:
             raise RuleError("the offset's tolerance reaches past the end of the sum")
         if not 0 < self.open_sum < self.over_sum < self.short_sum <= 65535:
             raise RuleError("the sums of open load, over-current and short must rise in this order")
-        for name in ("over_ticks", "open_ticks", "rate"):
+        for name in ("over_ticks", "open_ticks", "rate", *(["held_ticks"] if self.two else [])):
             if not 1 <= getattr(self, name) <= 65535:
                 raise RuleError(f"{name} is {getattr(self, name)}, expected 1 to 65535")
+
+    @property
+    def two(self) -> bool:
+        """Whether it has two solenoids, of which it drives one at a time."""
+        return self.held_ticks > 0 or self.shunts == 2
+
+    @property
+    def offset_ticks(self) -> int:
+        """PWM periods in which the offset of each shunt is calibrated."""
+        return self.shunts << self.offset_shift
 
     @property
     def largest_current(self) -> int:

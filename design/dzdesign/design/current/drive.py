@@ -52,6 +52,8 @@ OVER_SHARE, OVER_S = 1.2, 2e-3
 SHORT_RANGE, SHORT_SHARE = 0.98, 1.45
 #: Share of the rated current below which none seems to flow, and how many times that must flow where one is missed.
 OPEN_SHARE, OPEN_TIMES, OPEN_PATIENCE = 0.02, 3.0, 4.0
+#: PWM periods that a change of side takes beside the decay of the current.
+CHANGE_PERIODS = 5
 #: Of the converter's range, by which the sensor's zero may be off.
 OFFSET_SHARE = 0.02
 OFFSET_SHIFT = 6
@@ -147,9 +149,18 @@ def choose_loop(asked: CurrentRequest, compare_max: int) -> CurrentLoop:
         open_sum=max(1, above(OPEN_SHARE)),
         open_compare=ceil(open_duty * compare_max),
         open_ticks=ceil(OPEN_PATIENCE * slowest_s * log(OPEN_TIMES / (OPEN_TIMES - 1)) * sampling.tick_Hz),
+        held_ticks=rest_ticks(circuit, sampling) if asked.solenoids == 2 else 0,
+        shunts=asked.shunts,
         supply=_supply_correction(circuit, sensor, converter),
     )
     return _with_release(_with_rate(loop, asked), asked)
+
+
+def rest_ticks(circuit: CoilCircuit, sampling: CurrentSampling) -> int:
+    """Return the PWM periods with the output off in which the largest current decays at the slowest corner."""
+    largest_A = SHORT_SHARE * circuit.rated_A
+    slowest_s = max(circuit.fastest_fall_s(corner, largest_A, 0.0) for corner in circuit.corners())
+    return ceil(slowest_s * sampling.tick_Hz)
 
 
 def _with_rate(loop: CurrentLoop, asked: CurrentRequest) -> CurrentLoop:
@@ -286,11 +297,25 @@ class CurrentDrive:
 
     @property
     def rest_ticks(self) -> int:
-        """PWM periods with the output off after which no current is left: of the largest, at the slowest corner."""
+        """PWM periods with the output off after which no current is left."""
+        return rest_ticks(self.circuit, self.sampling)
+
+    @property
+    def decayed_A(self) -> float:
+        """Current of one solenoid below which the other is driven."""
+        return OPEN_SHARE * self.circuit.rated_A
+
+    @property
+    def change_s(self) -> float:
+        """Longest time from a change of side to the first pulse of the other solenoid, at the slowest corner.
+
+        From the largest current that is no fault. A period ends before the output is off, the sum of codes is of two
+        periods, and the next two set the compare value and load it.
+        """
         circuit = self.circuit
-        largest_A = SHORT_SHARE * circuit.rated_A
-        slowest_s = max(circuit.fastest_fall_s(corner, largest_A, 0.0) for corner in circuit.corners())
-        return ceil(slowest_s * self.sampling.tick_Hz)
+        largest_A = OVER_SHARE * circuit.rated_A
+        slowest_s = max(circuit.fastest_fall_s(corner, largest_A, self.decayed_A) for corner in circuit.corners())
+        return slowest_s + CHANGE_PERIODS * self.sampling.period_s
 
     def in_words(self, units: RecordedUnits) -> tuple[str, ...]:
         """Return lines for a person."""
@@ -307,6 +332,12 @@ class CurrentDrive:
             f"ms with the switch on all the time), overshoot up to {self.overshoot:.1%}; 90 to 10 % takes up to "
             f"{1e3 * self.fall_s:.0f} ms, as the freewheeling diode alone brakes",
         ]
+        if loop.two:
+            shunts = "each solenoid with a shunt of its own" if loop.shunts == 2 else "one shunt for both solenoids"
+            lines.append(
+                f"change of side: a solenoid is driven once the current of the other is below "
+                f"{units.text(self.decayed_A, '.3g A')}, after {1e3 * self.change_s:.0f} ms at most; {shunts}"
+            )
         weakest = min(circuit.corners(), key=lambda corner: corner.supply_V / corner.resistance_ohm)
         if circuit.duty(weakest, circuit.rated_A) >= 1:  # no supply drives the rated current there, so it has no step
             most = units.text(weakest.supply_V / weakest.resistance_ohm, ".3g A")

@@ -36,6 +36,9 @@ class CurrentRequest:
     sensor: CurrentSensor
     sampling: CurrentSampling
     converter: Converter
+    #: Solenoids, of which one is driven at a time, and the shunts for them.
+    solenoids: int = 1
+    shunts: int = 1
 
     @property
     def codes_per_V(self) -> float:

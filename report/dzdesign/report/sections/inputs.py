@@ -55,7 +55,7 @@ def map_figure(curves: Curves, compensator: Compensator, inputs: InputCheck) -> 
     order = np.lexsort((curves["command_code"], curves["dp_code"]))
     compare, status = (curves[name][order].reshape(dp_codes.size, codes.size) for name in ("compare", "status"))
     command = 100 * (codes - signals.command.zero_code) / (signals.command.direction(sign) * signals.command.span(sign))
-    dp = units.convert(dp_codes * float(signals.pressure_a.per_code_MPa), "MPa")
+    dp = units.convert(dp_codes * float(signals.pair(sign).ahead.per_code_MPa), "MPa")
     output, fallen = units.convert(volt * compare, "V"), status != 0
     low, high = (units.convert(float(end), "MPa") for end in laws_of(compensator)[side].certificate.dp_MPa)
     room = max(0.3 * (high - low), 0.02 * float(np.ptp(dp)))  # of one tested pressure drop, too, a strip is shown

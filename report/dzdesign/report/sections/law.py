@@ -151,7 +151,7 @@ def law_figure(compensator: Compensator, name: str, both: bool) -> ReportFigure:
     axes.plot([0, 100], bare, ":", color=LIGHT["soft"], lw=1.3, label="without compensator")
     rows = []
     for dp_MPa, dash, hue in ((low, "-", "blue"), (high, "--", "vermilion")):
-        corners = exact.corners(exact.betas(round(compensator.signals.dp_code(Fraction(dp_MPa)))))
+        corners = exact.corners(exact.betas(round(compensator.signals.pair(exact.sign).dp_code(Fraction(dp_MPa)))))
         percent = [100 * away / exact.span for away, _ in corners]
         volts = [u_max * float(count) / exact.compare_max for _, count in corners]
         shown = units.convert(np.array(volts), "V")

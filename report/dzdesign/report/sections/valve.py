@@ -278,7 +278,8 @@ def _beta_table(compensator: Compensator, name: str) -> tuple[np.ndarray, np.nda
     """Return pressure drops (MPa) and betas at the nodes of the compensator's table, and its u_min0 (V)."""
     law = laws_of(compensator)[name]
     nodes = np.array(law.beta)
-    where = np.arange(nodes.size) * compensator.beta_step_codes * float(compensator.signals.pressure_a.per_code_MPa)
+    ahead = compensator.signals.pair(-1 if name == "negative" else 1).ahead
+    where = np.arange(nodes.size) * compensator.beta_step_codes * float(ahead.per_code_MPa)
     return where, nodes / compensator.beta_denominator, float(law.u_min0_over_u_max * compensator.u_max_V)
 
 

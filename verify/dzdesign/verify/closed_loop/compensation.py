@@ -82,7 +82,7 @@ def _dead_zone(ramps: Sequence[PressureResult], compensator: Compensator) -> Ite
     found = []
     for ramp in ramps:
         sign, test = SIGNS[ramp.side], nearest_test(ramp, compensator.valve)
-        corners = corners_of(compensator, compensator.signals.code_at(test.dp_MPa), sign)
+        corners = corners_of(compensator, compensator.signals.pair(sign).code_at(test.dp_MPa), sign)
         own = max(corners.command_at(ramp.dead_zone_opening), corners.leaves)
         stated = max(remaining_dead_zone(compensator, test, sign).get("opening", 0.0), own)
         found.append((ramp.residual_opening - stated, ramp))
@@ -148,6 +148,7 @@ def _promised(ramp: PressureResult, curves: Mapping[str, Curves], compensator: C
         here = float(np.interp(ramp.dp_MPa, at_zero["dp_MPa"], drive))
         return 1 - (float(drive.max()) - here) / (1 - here)
     test = nearest_test(ramp, compensator.valve)
-    full = corners_of(compensator, compensator.signals.code_at(test.dp_MPa), SIGNS[ramp.side]).full
+    sign = SIGNS[ramp.side]
+    full = corners_of(compensator, compensator.signals.pair(sign).code_at(test.dp_MPa), sign).full
     flow: float = test.recorded.opening.flow_at(np.array([full * u_max_V]))[0] / test.recorded.q_max_L_min
     return flow

@@ -40,15 +40,19 @@ def reading_errors(scene: Scene, way: int, *, bench: bool = False) -> ReadingErr
         if machine
         else (converter.offset_codes, converter.gain_codes, converter.noise_codes)
     )
-    a_MPa, b_MPa = (machine.pressure_error_a_MPa, machine.pressure_error_b_MPa) if machine else (0.0, 0.0)
-    a_MPa += machine.bench_pressure_error_MPa if machine and bench else 0.0
-    own_a, own_b = np.array([a_MPa, b_MPa]) * scene.loop.channels.per_unit[1:]
-    a, b = (-way, way) if scene.loop.channels.swapped else (way, -way)
+    names = scene.loop.channels.names
+    ahead_MPa, behind_MPa = (machine.pressure_error_MPa(name) for name in names) if machine else (0.0, 0.0)
+    ahead_MPa += machine.bench_pressure_error_MPa if machine and bench else 0.0
+    own_ahead, own_behind = np.array([ahead_MPa, behind_MPa]) * scene.loop.channels.per_unit[1:]
     reads_command = bench and scene.compensator.zero_band_codes > 0
     direction = scene.compensator.signals.command.direction(scene.sign)
     return ReadingErrors(
-        offset_codes=(direction * command.offset_codes * reads_command, a * (offset + own_a), b * (offset + own_b)),
-        gain_codes=(0.0, a * gain, b * gain),
+        offset_codes=(
+            direction * command.offset_codes * reads_command,
+            way * (offset + own_ahead),
+            -way * (offset + own_behind),
+        ),
+        gain_codes=(0.0, way * gain, -way * gain),
         noise_codes=(command.noise_codes * reads_command, noise, noise),
         seed=SEED,
     )

@@ -23,7 +23,8 @@ PERIODS_PER_RECORD = 25
 RECORD_S = PERIODS_PER_RECORD * PWM_PERIOD_S
 #: Numbers in a record, as loop.c has them.
 RECORDED = (
-    "compare", "dp_MPa", "q_L_min", "q_mean_L_min", "q_largest_L_min", "position_m", "code_a", "code_b", "mean_V",
+    "compare", "dp_MPa", "q_L_min", "q_mean_L_min", "q_largest_L_min", "position_m", "code_ahead", "code_behind",
+    "mean_V",
 )  # fmt: skip
 #: Pressure behind the edge where none is given, as on a bench: what both sensors see beside the drop.
 BENCH_BACK_MPA = 1.0
@@ -44,7 +45,7 @@ MODES = ("direct", "compensated", "without beta")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReadingErrors:
-    """What the converter, and the sensors before it, read wrong; of command, sensor A and sensor B, (3,) each.
+    """What the converter, and the sensors before it, read wrong; of command, sensor ahead and sensor behind, (3,) each.
 
     The noise is white: whole codes from minus its peak to plus it, drawn again at every sample of the core.
     """
@@ -62,18 +63,23 @@ NO_ERRORS = ReadingErrors()
 
 
 class Channels:
-    """The converter's channels of one sign of command: command, sensor A, sensor B."""
+    """The converter's channels of one sign of command: command, the sensors ahead of its edge and behind it."""
 
     def __init__(self, signals: Signals, sign: int) -> None:
-        command, sensors = signals.command, (signals.pressure_a, signals.pressure_b)
+        command, pair = signals.command, signals.pair(sign)
+        sensors = (pair.ahead, pair.behind)
         full = command.zero_code + command.direction(sign) * command.span(sign)
         #: Codes at zero, (3,), and at the span, which is 1, MPa and MPa.
         self.zeros = np.array([command.zero_code, *(sensor.zero_code for sensor in sensors)], dtype=np.int32)
         self.fulls = np.array([full, *(sensor.full_code for sensor in sensors)], dtype=np.int32)
         self.spans = np.array([1.0, *(float(sensor.span_MPa) for sensor in sensors)])
         self.code_max = signals.code_max
-        #: Whether sensor B stands upstream of the edge.
-        self.swapped = sign < 0 and signals.swapped
+        #: Names of the two inputs, and which of A, B and C each is.
+        self.names = pair.names
+        self.inputs = tuple("ABC".index(name) for name in pair.names)
+        #: Code of the input that the side does not read: a pressure in the middle of its span.
+        others = [sensor for name, sensor in signals.pressures.items() if name not in pair.names]
+        self.other_code = sum((sensor.zero_code + sensor.full_code) // 2 for sensor in others)
         #: Codes for one of what each channel measures; and as a converter rounds: a span of n codes has n + 1 of them.
         self.per_unit = (self.fulls - self.zeros) / self.spans
         self.converted_per_unit = (self.fulls - self.zeros + np.sign(self.fulls - self.zeros)) / self.spans
@@ -89,10 +95,10 @@ class Channels:
         return middle
 
     def pressure_codes(self, dp_MPa: float | np.ndarray, back_MPa: float | np.ndarray) -> np.ndarray:
-        """Return the codes of sensors A and B at a pressure drop and a pressure downstream of the edge, (..., 2)."""
+        """Return the codes ahead and behind at a pressure drop and a pressure downstream of the edge, (..., 2)."""
         back = np.asarray(back_MPa, dtype=float)
         ahead = back + dp_MPa
-        values = np.stack([back, ahead] if self.swapped else [ahead, back], axis=-1)
+        values = np.stack([ahead, back], axis=-1)
         codes = np.floor(self.zeros[1:] + values * (self.fulls[1:] - self.zeros[1:] + 1) / self.spans[1:])
         whole: np.ndarray = np.clip(codes, 0, self.code_max).astype(np.int32)
         return whole
@@ -120,7 +126,7 @@ class RampSequence:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoopRun:
     """Records of one run, 100 a second unless others were asked for: time in s, command share, compare value, dP in
-    MPa, flow in L/min, position of the spool in mm, the codes of sensors A and B that the core read last, mean current
+    MPa, flow in L/min, position of the spool in mm, the codes ahead and behind that the core read last, mean current
     of the last period in V of command, all (N,).
 
     Of the flow three: at the record's end; its mean over the record, and its largest there. A dither of 100 Hz or more
@@ -135,8 +141,8 @@ class LoopRun:
     q_mean_L_min: np.ndarray
     q_largest_L_min: np.ndarray
     position_mm: np.ndarray
-    code_a: np.ndarray
-    code_b: np.ndarray
+    code_ahead: np.ndarray
+    code_behind: np.ndarray
     mean_V: np.ndarray
 
 
@@ -301,7 +307,7 @@ class ClosedLoop:
         `command` (N,) is a share of u_max, one value a record of `periods_per_record` periods of the PWM; `supply_MPa`
         is the pressure drop at no flow and `back_MPa` the pressure behind the edge, (N,) where they change; without one
         that of a bench, as far as the sensors span it. `added_V` is added to the plant's drive, V of command. Of
-        sensors that fail `shown` (N, 2) are the codes of A and B; below zero: the plant's own. Pressures above a
+        sensors that fail `shown` (N, 2) are the codes ahead and behind; below zero: the plant's own. Pressures above a
         sensor's span read as the converter's largest code. Mode "without beta" shows `dp_frozen_MPa` to the core.
         """
         if mode not in MODES:
@@ -325,8 +331,8 @@ class ClosedLoop:
             plant = replace(plant, L_c_H=HOLDING_H)
             structs = (coil.coil_struct(self._corner), coil.sensor_struct())
         choices = (
-            command.size, periods_per_record, mode != "direct", self._negative, channels.swapped, *self.wave,
-            channels.code_max, self._signals.compare_max, errors.seed,
+            command.size, periods_per_record, mode != "direct", self._negative, *channels.inputs, channels.other_code,
+            *self.wave, channels.code_max, self._signals.compare_max, errors.seed,
         )  # fmt: skip
         of_channels = np.array([errors.offset_codes, errors.gain_codes, errors.noise_codes], dtype=float).T.copy()
         self._library.call(

@@ -27,8 +27,6 @@ OILS = {"cold oil, 8 times the viscosity": (8.0, 1.03), "hot oil, a quarter of t
 SLOWER = 0.5
 #: Time of its ramp, slow against coil and spool, s.
 SLOW_S = 20.0
-#: Names of the pressure sensors.
-SENSORS = ("A", "B")
 #: Pressure drops above the tested ones, over the highest of these.
 ABOVE = (1.25, 1.6, 2.0)
 
@@ -231,7 +229,7 @@ def sensor_failures(scene: Scene) -> Iterator[ScenarioResult]:
     code_max = scene.compensator.signals.code_max
     ends = sorted({scene.back_within_span(back) for back in scene.backs_MPa})
     for back_MPa in ends:
-        for sensor, name in enumerate(SENSORS):
+        for sensor, name in enumerate(scene.loop.channels.names):
             yield _failed(scene, sensor, 0, f"sensor {name} breaks: its code is 0", back_MPa)
             yield _failed(scene, sensor, code_max, f"sensor {name} is shorted: its code is {code_max}", back_MPa)
             yield from _stuck(scene, sensor, back_MPa, (ends[0], ends[-1]))
@@ -249,7 +247,7 @@ def _failed(scene: Scene, sensor: int, code: int, name: str, back_MPa: float) ->
 
 def _stuck(scene: Scene, sensor: int, back_MPa: float, ends_MPa: Ends) -> Iterator[ScenarioResult]:
     """The sensor goes on showing what it shows, and the pressure at it goes from one end to the other."""
-    behind = (sensor == 1) != scene.loop.channels.swapped
+    behind = sensor == 1
     # Pressure drop and pressure behind the edge, before and after.
     changes: list[tuple[Ends, Ends]] = []
     if behind:
@@ -265,7 +263,7 @@ def _stuck(scene: Scene, sensor: int, back_MPa: float, ends_MPa: Ends) -> Iterat
         what, pair = ("the pressure behind the edge", backs_MPa) if behind else ("dP", supply_MPa)
         first, then = (scene.units.text(value, ".2f MPa") for value in pair)
         yield scene.result(
-            f"sensor {SENSORS[sensor]} is stuck while {what} goes from {first} to {then}",
+            f"sensor {scene.loop.channels.names[sensor]} is stuck while {what} goes from {first} to {then}",
             scene.run(command, supply_MPa=supply, back_MPa=back, shown=shown),
             back_MPa=backs_MPa[1],
             end_MPa=supply_MPa[1],
@@ -287,11 +285,11 @@ def _unknowable(scene: Scene, codes: np.ndarray, sensor: int, code: int) -> str:
     one.
     """
     compensator, sign = scene.compensator, scene.sign
-    signals = compensator.signals
-    first, last = (signals.pressure_a, signals.pressure_b)[sensor].valid_codes
+    pair = compensator.signals.pair(sign)
+    first, last = (pair.ahead, pair.behind)[sensor].valid_codes
     seen = codes.copy()
     seen[sensor] = code
-    true, wrong = (signals.difference(int(a), int(b), sign) for a, b in (codes, seen))
+    true, wrong = (pair.difference(int(a), int(b)) for a, b in (codes, seen))
     if not first <= code <= last or wrong < -compensator.reverse_codes:
         return ""
     # Of a law with a transition the drive at zero command is the certified one.

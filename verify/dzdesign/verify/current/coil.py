@@ -25,14 +25,19 @@ from dzdesign.design.target_inputs import Converter
 from dzdesign.verify.current.controller_states import PROGRAMS, tick_macro
 from dzdesign.verify.toolchain.compiled_library import CompiledLibrary, Function
 
-#: `struct trace` of programs/coil_loop.h: of each period of the PWM the mean current, the compare value in it, the sum
-#: of codes that its interrupt was given, and the bits of the faults after it.
-TRACE = np.dtype([("mean_A", "<f8"), ("compare", "<u2"), ("total", "<u2"), ("faults", "<u2"), ("_", "<u2")])
+#: `struct trace` of programs/coil_loop.h: of each period of the PWM the mean currents of solenoids A and B, the largest
+#: current in both at once, the compare value in it, the sum of codes that its interrupt was given, and the bits of the
+#: faults after it.
+TRACE = np.dtype(
+    [("means_A", "<f8", 2), ("both_A", "<f8")] + [(name, "<u2") for name in ("compare", "total", "faults", "_")]
+)
+#: Bits of solenoids A and B.
+BOTH = 3
 #: `struct coil` and `struct sensor` of programs/coil.h.
 COIL = np.dtype(
     [(name, "<f8") for name in ("resistance_ohm", "inductance_H", "supply_V", "freewheel_V")]
     + [(name, "<f8") for name in ("period_s", "full_counts", "rated_A")]
-    + [(name, "<i4") for name in ("samples", "samples_before", "stuck")],
+    + [(name, "<i4") for name in ("samples", "samples_before", "stuck", "solenoids")],
     align=True,
 )
 SENSOR = np.dtype([(name, "<f8") for name in ("V_per_A", "offset_V", "codes_per_V", "code_max", "supply_divider")])
@@ -123,12 +128,12 @@ class CoilLoop:
         moved_V = self.sensor.offset_V + codes * float(self.converter.full_V) / self.converter.levels
         return replace(self, sensor=replace(self.sensor, offset_V=moved_V))
 
-    def coil_struct(self, corner: Corner, *, stuck: bool = False) -> np.ndarray:
+    def coil_struct(self, corner: Corner, *, stuck: bool = False, solenoids: int = BOTH) -> np.ndarray:
         """Return a coil at a supply as the C code takes it; of one that is stuck the switch stays on."""
         sampling = self.sampling
         values = (
             *corner, self.circuit.freewheel_V, sampling.period_s, self.loop.full_counts, self.circuit.rated_A,
-            sampling.samples, sampling.before, stuck,
+            sampling.samples, sampling.before, stuck, solenoids,
         )  # fmt: skip
         return np.array([values], dtype=COIL)
 
@@ -150,11 +155,12 @@ def least_rise_s(corner: Corner, start_A: float, end_A: float) -> float:
 
 
 class Change(NamedTuple):
-    """Another coil from a period on, whose switch may stay on."""
+    """Another coil from a period on, whose switch may stay on; a bit for each solenoid that has it, A's first."""
 
     period: int
     corner: Corner
     stuck: bool = False
+    solenoids: int = BOTH
 
 
 class CoilSimulation:
@@ -177,12 +183,18 @@ class CoilSimulation:
     ) -> np.ndarray:
         """Run from no current, calibrated, over a set point for each period; return a `TRACE` of each.
 
-        `around` may have another sensor.
+        Of two solenoids it is that of A, or there are two columns. `around` may have another sensor.
         """
         around = around or self.around
-        asked = np.ascontiguousarray(set_points, dtype=np.uint16)
+        asked = np.asarray(set_points, dtype=np.uint16)
+        if asked.ndim == 1:
+            asked = np.stack([asked, np.zeros_like(asked)], axis=1)
+        asked = np.ascontiguousarray(asked)
         found = np.zeros(len(asked), dtype=TRACE)
-        coils = [around.coil_struct(each.corner, stuck=each.stuck) for each in (Change(0, corner), *changes)]
+        coils = [
+            around.coil_struct(each.corner, stuck=each.stuck, solenoids=each.solenoids)
+            for each in (Change(0, corner), *changes)
+        ]
         begins = np.array([0, *(each.period for each in changes)], dtype=np.uint32)
         self._library.call(
             "coil_loop", np.concatenate(coils), begins, len(coils), around.sensor_struct(), asked, len(asked), found

@@ -15,8 +15,8 @@ import numpy as np
 from dzdesign.design.current.circuit import Corner
 from dzdesign.design.drive_functions import DriveFunctions
 from dzdesign.verify.current.coil import Change, CoilLoop, CoilSimulation, least_rise_s
-from dzdesign.verify.current.controller_states import OPEN, OVER, SENSOR, SHORT
-from dzdesign.verify.current.results import CurrentCorner, FaultName, FaultRun
+from dzdesign.verify.current.controller_states import HELD, OF_B, OPEN, OVER, SENSOR, SHORT
+from dzdesign.verify.current.results import CurrentCorner, FaultName, FaultRun, SolenoidChanges
 
 #: Currents at which margins are taken, of the rated one: the pulse's end lies elsewhere at each.
 CURRENTS = (0.1, 0.25, 0.5, 0.75, 1.0)
@@ -34,7 +34,12 @@ OFFSET_SHARES, OFFSET_BEYOND = (0.9, -0.9), 1.5
 #: A fault of the circuit comes in the middle of that set point, and goes after a while.
 FAULT_SHARE, FAULT_S = 0.5, 0.2
 OPEN_OHM, SHORTED = 1e7, 0.02
-BITS: dict[FaultName, int] = {"OPEN": OPEN, "SHORT": SHORT, "OVER": OVER, "SENSOR": SENSOR}
+BITS: dict[FaultName, int] = {"OPEN": OPEN, "SHORT": SHORT, "OVER": OVER, "SENSOR": SENSOR, "HELD": HELD}
+#: Share of the rated current that a switch which does not open keeps: neither over-current nor short.
+STUCK_SHARE = 0.6
+#: Before a change of side the set point stands so long; the side is changed back after each number of periods up to
+#: that in which no current is left, as a share of it.
+CHANGE_S, CHANGED_BACK = 0.06, 1.2
 #: Periods of the PWM that a fault may take beyond those that it must last.
 REACTION_PERIODS = 25
 
@@ -128,7 +133,7 @@ def held_current(simulation: CoilSimulation, corner: Corner, share: float, offse
     # As the converter gives it without current: rounded down.
     zero = np.floor((around.sensor.offset_V * around.codes_per_V) + offset_codes)
     readings = found["total"][settle:].astype(float) / sampling.samples - zero
-    released, mean = np.split(found["mean_A"] * around.codes_per_A, [settle])
+    released, mean = np.split(found["means_A"][:, 0] * around.codes_per_A, [settle])
     return HeldCurrent(
         swing=float(max(np.ptp(mean), np.ptp(readings))),
         reading_error=float(abs(readings.mean() - asked)),
@@ -160,7 +165,7 @@ def dithered_current(
         wave = np.where(up, set_point + counts, max(set_point - counts, 0))
         for corner in around.corners():
             if around.carries(corner, (set_point + counts) / around.loop.full_counts):
-                mean_A = simulation.run(corner, wave)["mean_A"][settle:]
+                mean_A = simulation.run(corner, wave)["means_A"][settle:, 0]
                 peak = float(mean_A.max()) / unit_A - set_point - counts
                 above, below = max(above, peak), max(below, -peak)
     return above, below
@@ -212,7 +217,7 @@ def _step(simulation: CoilSimulation, corner: Corner) -> _Step:
     found = simulation.run(corner, np.repeat(points, (before, after)))
     low_A, high_A = (share * around.circuit.rated_A for share in STEP)
     risen_A = low_A + RISEN * (high_A - low_A)
-    step = found["mean_A"][before:]
+    step = found["means_A"][before:, 0]
     reached = np.flatnonzero(step >= risen_A)
     least_s = least_rise_s(corner, low_A, risen_A)
     return _Step(
@@ -223,25 +228,45 @@ def _step(simulation: CoilSimulation, corner: Corner) -> _Step:
     )
 
 
+def solenoid_changes(simulation: CoilSimulation) -> SolenoidChanges | None:
+    """Change from one solenoid to the other and back, at every phase of the decay and at every corner."""
+    around = simulation.around
+    if not around.loop.two:
+        return None
+    settle, phases = (
+        ceil(count) for count in (CHANGE_S * around.sampling.tick_Hz, CHANGED_BACK * around.loop.held_ticks)
+    )
+    lengths = np.array([[settle, phase] for phase in range(1, phases + 1)]).ravel()
+    both_A, slowest, faults = 0.0, 0, 0
+    for corner in around.corners():
+        share = max((share for share in SHARES if around.carries(corner, share)), default=0.0)
+        asked = np.zeros((lengths.sum(), 2), dtype=np.uint16)
+        driven = np.repeat(np.arange(len(lengths)) % 2, lengths)
+        asked[np.arange(len(asked)), driven] = round(share * around.loop.full_counts)
+        for columns in ([0, 1], [1, 0]):
+            found = simulation.run(corner, asked[:, columns])
+            both_A, faults = max(both_A, float(found["both_A"].max())), faults | int(found["faults"][-1])
+            # The last change is the one that was not taken back before its end.
+            began = len(asked) - phases
+            pulses = np.flatnonzero(found["means_A"][began:, columns.index(1)] > 0)
+            slowest = max(slowest, int(pulses[0]) if len(pulses) else phases)
+    return SolenoidChanges(
+        corners=len(around.corners()),
+        phases=phases,
+        both_A=both_A,
+        slowest_s=slowest * around.sampling.period_s,
+        faults=faults,
+    )
+
+
 def fault_runs(simulation: CoilSimulation) -> Iterator[FaultRun]:
     """Break the circuit in motion in each way that the controller must see, mend it, and look on."""
+    for solenoid in range(2 if simulation.around.loop.two else 1):
+        yield from _solenoid_faults(simulation, solenoid)
     around = simulation.around
-    loop, sampling, nominal = around.loop, around.sampling, around.at()
-    reaction_s = REACTION_PERIODS * sampling.period_s
-    broken = nominal._replace(resistance_ohm=OPEN_OHM)
-    yield _fault_run(
-        simulation, "the coil's wire breaks", "OPEN", reaction_s + loop.open_ticks * sampling.period_s, broken
-    )
-    shorted = Corner(SHORTED * nominal.resistance_ohm, SHORTED * nominal.inductance_H, nominal.supply_V)
-    yield _fault_run(simulation, "the coil is shorted", "SHORT", reaction_s, shorted)
-    # A switch that stays on through a coil in which the current ends between the limits of over-current and short.
-    ends_A = (loop.over_sum + loop.short_sum - loop.offset_nominal) / 2 / (around.codes_per_A * sampling.samples)
-    warm = nominal._replace(resistance_ohm=nominal.supply_V / ends_A)
-    # The current must get there: some time constants of that coil.
-    over_s = reaction_s + loop.over_ticks * sampling.period_s + 5 * warm.inductance_H / warm.resistance_ohm
-    yield _fault_run(simulation, "the switch stays on", "OVER", over_s, warm, stuck=True)
-    beyond = OFFSET_BEYOND * loop.offset_tolerance / sampling.samples
-    found = simulation.run(nominal, np.full(100, loop.full_counts // 2), around=around.with_offset(beyond))
+    beyond = OFFSET_BEYOND * around.loop.offset_tolerance / around.sampling.samples
+    set_points = np.full(100, around.loop.full_counts // 2)
+    found = simulation.run(around.at(), set_points, around=around.with_offset(beyond))
     yield FaultRun(
         name="the sensor's zero is too far off",
         expected="SENSOR",
@@ -251,19 +276,53 @@ def fault_runs(simulation: CoilSimulation) -> Iterator[FaultRun]:
     )
 
 
+def _solenoid_faults(simulation: CoilSimulation, solenoid: int) -> Iterator[FaultRun]:
+    """Yield the faults of one solenoid, A or B."""
+    around = simulation.around
+    loop, sampling, nominal = around.loop, around.sampling, around.at()
+    reaction_s = REACTION_PERIODS * sampling.period_s
+    broken = nominal._replace(resistance_ohm=OPEN_OHM)
+    open_s = reaction_s + loop.open_ticks * sampling.period_s
+    yield _fault_run(simulation, solenoid, "the coil's wire breaks", "OPEN", open_s, broken)
+    shorted = Corner(SHORTED * nominal.resistance_ohm, SHORTED * nominal.inductance_H, nominal.supply_V)
+    yield _fault_run(simulation, solenoid, "the coil is shorted", "SHORT", reaction_s, shorted)
+    # A switch that stays on through a coil in which the current ends between the limits of over-current and short.
+    ends_A = (loop.over_sum + loop.short_sum - loop.offset_nominal) / 2 / (around.codes_per_A * sampling.samples)
+    warm = nominal._replace(resistance_ohm=nominal.supply_V / ends_A)
+    # The current must get there: some time constants of that coil.
+    over_s = reaction_s + loop.over_ticks * sampling.period_s + 5 * warm.inductance_H / warm.resistance_ohm
+    yield _fault_run(simulation, solenoid, "the switch stays on", "OVER", over_s, warm, stuck=True)
+    if loop.two:
+        warm = nominal._replace(resistance_ohm=nominal.supply_V / (STUCK_SHARE * around.circuit.rated_A))
+        held_s = reaction_s + loop.held_ticks * sampling.period_s
+        name = "the switch stays on as the other solenoid is asked for"
+        yield _fault_run(simulation, solenoid, name, "HELD", held_s, warm, stuck=True)
+
+
 def _fault_run(
-    simulation: CoilSimulation, name: str, expected: FaultName, limit_s: float, corner: Corner, *, stuck: bool = False
+    simulation: CoilSimulation,
+    solenoid: int,
+    name: str,
+    expected: FaultName,
+    limit_s: float,
+    corner: Corner,
+    *,
+    stuck: bool = False,
 ) -> FaultRun:
-    around, bit = simulation.around, BITS[expected]
+    around, bit = simulation.around, BITS[expected] << OF_B * solenoid
     nominal, period_s = around.at(), around.sampling.period_s
     lasts = ceil(max(FAULT_S, limit_s) / period_s)
-    set_points = np.full(3 * lasts, round(FAULT_SHARE * around.loop.full_counts))
-    found = simulation.run(nominal, set_points, [Change(lasts, corner, stuck), Change(2 * lasts, nominal)])
+    set_points = np.zeros((3 * lasts, 2), dtype=np.uint16)
+    driven = np.where((np.arange(3 * lasts) >= lasts) & (expected == "HELD"), 1 - solenoid, solenoid)
+    set_points[np.arange(3 * lasts), driven] = round(FAULT_SHARE * around.loop.full_counts)
+    changes = [Change(lasts, corner, stuck, 1 << solenoid), Change(2 * lasts, nominal, solenoids=1 << solenoid)]
+    found = simulation.run(nominal, set_points, changes)
     seen = np.flatnonzero(found["faults"] & bit)
-    in_time = len(seen) > 0 and seen[0] >= lasts
+    # Of two solenoids no bit of the other one may stand.
+    in_time = len(seen) > 0 and seen[0] >= lasts and not np.any(found["faults"] >> OF_B * (1 - solenoid) & 0xFF)
     after = int(seen[0]) + 1 if in_time else lasts
     return FaultRun(
-        name=name,
+        name=f"solenoid {'AB'[solenoid]}: {name}" if around.loop.two else name,
         expected=expected,
         seen_after_s=(after - lasts) * period_s if in_time else None,
         limit_s=limit_s,

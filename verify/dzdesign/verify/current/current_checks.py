@@ -11,11 +11,18 @@ from dzdesign.design.current.drive import CurrentDrive
 from dzdesign.verify.current import corner_runs
 from dzdesign.verify.current.coil import CoilLoop, CoilSimulation
 from dzdesign.verify.current.controller_states import BLOCK, SEED, check_states, hashes_on
-from dzdesign.verify.current.results import ControllerStates, CurrentCorner, CurrentLoopResult, FaultRun
+from dzdesign.verify.current.results import (
+    ControllerStates,
+    CurrentCorner,
+    CurrentLoopResult,
+    FaultRun,
+    SolenoidChanges,
+)
 from dzdesign.verify.requirements import (
     CURRENT_FAULTS,
     CURRENT_MARGINS,
     CURRENT_SETTLES,
+    CURRENT_SOLENOIDS,
     CURRENT_STATES,
     CURRENT_STEP,
     MACHINE_CODE,
@@ -78,6 +85,7 @@ def current_checks(
         _settles_check(result, drive, around),
         _step_check(result, drive, around),
         _faults_check(result.faults),
+        *([_changes_check(result.changes, drive, around)] if result.changes else []),
     )
     return CurrentChecks(checks=checks, result=result)
 
@@ -109,7 +117,7 @@ def zero_command_points(compensator: Compensator) -> tuple[int, ...]:
     """Return the set points at zero command at the ends of the tested interval, counts."""
     signals, ends = compensator.signals, compensator.positive.certificate.dp_MPa
     zero = signals.command.zero_code
-    return tuple(sorted({compensator.compare(zero, round(signals.dp_code(dp))) for dp in ends}))
+    return tuple(sorted({compensator.compare(zero, round(signals.pair(1).dp_code(dp))) for dp in ends}))
 
 
 def _result(simulation: CoilSimulation, found: ControllerStates, compensator: Compensator) -> CurrentLoopResult:
@@ -128,6 +136,7 @@ def _result(simulation: CoilSimulation, found: ControllerStates, compensator: Co
         dither_above_counts=above,
         dither_below_counts=below,
         faults=tuple(corner_runs.fault_runs(simulation)),
+        changes=corner_runs.solenoid_changes(simulation),
     )
 
 
@@ -219,6 +228,20 @@ def _step_check(result: CurrentLoopResult, drive: CurrentDrive, around: CoilLoop
     if len(stepped) < len(result.corners):
         text += f"; {len(result.corners) - len(stepped)} corners can't carry the rated current"
     return CURRENT_STEP.check(holds=as_printed and overshoot <= MOST_OVERSHOOT, text=text)
+
+
+def _changes_check(changes: SolenoidChanges, drive: CurrentDrive, around: CoilLoop) -> Check:
+    # A sum of codes that are rounded down, as the offset is, shows up to a code less.
+    allowed_A = (drive.loop.open_sum / drive.loop.samples + 1) / around.codes_per_A
+    text = (
+        f"{changes.corners} corners, the side changed back after 1 to {changes.phases} PWM periods: both solenoids at "
+        f"once have up to {changes.both_A:.4g} A (allowed: {allowed_A:.4g}), and the other one its first current "
+        f"{1e3 * changes.slowest_s:.1f} ms after a change (at most {1e3 * drive.change_s:.1f})"
+    )
+    if changes.faults:
+        text += f"; faults {changes.faults:#x} of circuits without a fault"
+    holds = changes.both_A <= allowed_A and changes.slowest_s <= drive.change_s and not changes.faults
+    return CURRENT_SOLENOIDS.check(holds=holds, text=text)
 
 
 def _faults_check(faults: tuple[FaultRun, ...]) -> Check:

@@ -9,7 +9,7 @@ from dzdesign.verify.loop_results import Count, about
 Share = Annotated[float, quantity("1", "Share of the rated current.", ge=0, le=1)]
 Codes = Annotated[float, quantity("codes", "Codes of the converter.", ge=-65536, le=65536)]
 #: Names of the bits of dz_current.h.
-FaultName = Literal["NO_OFFSET", "SENSOR", "OPEN", "SHORT", "OVER"]
+FaultName = Literal["NO_OFFSET", "SENSOR", "OPEN", "SHORT", "OVER", "HELD"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,9 +61,7 @@ class FaultRun:
 
     name: Annotated[str, about("Fault that is injected.")]
     expected: Annotated[FaultName, about("Fault bit that must be set.")]
-    seen_after_s: Annotated[
-        float | None, quantity("s", "Time from the fault to its bit; null if the bit was not set.")
-    ]
+    seen_after_s: Annotated[float | None, quantity("s", "Time from the fault to its bit; null if the bit was not set.")]
     limit_s: Annotated[float, quantity("s", "Longest permitted time.", ge=0, le=1e6)]
     latched: Annotated[bool, about("Whether the output stays off and the bit stays set after the fault is removed.")]
 
@@ -74,14 +72,28 @@ class FaultRun:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class SolenoidChanges:
+    """Changes from one solenoid to the other and back, at every phase of the decay and at every corner."""
+
+    corners: Annotated[Count, about("Number of coils at a supply.")]
+    phases: Annotated[Count, about("Number of PWM periods after which the side was changed back, from 1 on.")]
+    both_A: Annotated[float, quantity("A", "Largest current that both solenoids had at once.", ge=0, le=1e6)]
+    slowest_s: Annotated[
+        float, quantity("s", "Longest time from a change of side to the current of the other solenoid.", ge=0, le=1e6)
+    ]
+    faults: Annotated[Count, about("Fault bits DZ_CURRENT_... that the C code set; must be 0.")]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class CurrentLoopResult:
     """Result of the current loop: the C code alone, and with the coil at every corner of the declared ranges."""
 
     states: Annotated[ControllerStates, about("Comparison of the controller with its exact model, state by state.")]
     seconds: Annotated[float, quantity("s", "Time for which each set point was held after settling.", ge=0, le=1e6)]
     shares: Annotated[tuple[Share, ...], about("Set points, as shares of the rated current.")]
-    not_carried: Annotated[Count, about(
-        "Combinations of corner and set point that the supply can't carry. They were not tried.")]
+    not_carried: Annotated[
+        Count, about("Combinations of corner and set point that the supply can't carry. They were not tried.")
+    ]
     corners: Annotated[tuple[CurrentCorner, ...], about("Result of each corner.")]
     offset_codes: Annotated[
         tuple[Codes, ...], about("Zero errors of the sensor that were calibrated away at the nominal corner.")
@@ -97,3 +109,6 @@ class CurrentLoopResult:
         float, quantity("counts", "Deficit of the current's peak against that of the set point under dither.", ge=0)
     ]
     faults: Annotated[tuple[FaultRun, ...], about("Result of each injected fault.")]
+    changes: Annotated[
+        SolenoidChanges | None, about("Changes from one solenoid to the other; null of one solenoid.")
+    ] = None

@@ -170,7 +170,7 @@ def check_above(exact: ExactLaw, found: Differences, at_zero: np.ndarray) -> Abo
     ends = {last, certificate.holds_to_MPa} | {Fraction(repr(dp)) for dp in (continued.dp_MPa if continued else ())}
     drops = pressure_drops(exact, found, ends)
     # A code's middle is a whole number of steps: what it is compared with is brought to codes, exactly.
-    codes, step_MPa = found.values, exact.a.per_code_MPa
+    codes, step_MPa = found.values, exact.ahead.per_code_MPa
     above = drops.made & (codes > floor(last / step_MPa))
     curve = compensator.valve.sides[exact.side].certified[certificate.guard]
     most = floor(Fraction(repr(curve.offset_V[-1])) / unit_V)
@@ -301,7 +301,7 @@ def map_inputs(prepared: PreparedInputs, at_zero: np.ndarray) -> dict[str, Curve
     tested = np.flatnonzero(~np.isnan(known_V))
     commands, rows = _commands(exact), _grid_rows(found, tested).tolist()
     answers = [exact.answer(code, *_pair(exact, found, row)) for row in rows for code in commands]
-    a_MPa = float(exact.a.span_MPa) / (exact.a.full_code - exact.a.zero_code)
+    a_MPa = float(exact.ahead.per_code_MPa)
     volt = float(compensator.u_max_V) / exact.compare_max
     return {
         input_map_name(exact.side): {
@@ -340,4 +340,4 @@ def _grid_rows(found: Differences, tested: np.ndarray) -> np.ndarray:
 def _pair(exact: ExactLaw, found: Differences, row: int) -> tuple[int, int]:
     """Return a pair of sound pressure codes that makes a difference."""
     b = int(found.b_first[row])
-    return int(exact.turn * found.values[row] + found.slant[b]), b
+    return int(found.values[row] + found.slant[b]), b

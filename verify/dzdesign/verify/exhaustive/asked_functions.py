@@ -53,7 +53,8 @@ def functions_asked_for(compensator: Compensator) -> Check:
             faults.append(f"the dither is {made}, {wave[0]!r} is {float(peak):.0f} every {float(ticks):.1f}")
     elif texts.get("dither") == "off" and functions.dither_counts:
         faults.append(f"the dither has {functions.dither_counts} counts, none was asked for")
-    span = abs(signals.pressure_a.full_code - signals.pressure_a.zero_code)
+    ahead = (signals.pair(sign).ahead for sign in signals.signs)
+    span = min(abs(sensor.full_code - sensor.zero_code) for sensor in ahead)
     if compensator.reverse_codes > REVERSE * span:
         most = int(REVERSE * span)
         faults.append(f"a drop of -{compensator.reverse_codes} codes is no failure, expected {most} at most")

@@ -4,7 +4,7 @@ import copy
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import product
+from itertools import cycle, product, repeat
 from pathlib import Path
 from typing import NamedTuple
 
@@ -19,8 +19,8 @@ from dzdesign.verify.toolchain.machines import HOST, PROGRAMS, block_of, bound_f
 
 #: Of programs/drive.c: samples and ticks of each; codes, what is put, states; what was found.
 CHECK = Function("dz_check_drive", ("int32_t", "int32_t", "in", "in", "in", "both"))
-#: Codes of command, pressure A and pressure B.
-Codes = tuple[int, int, int]
+#: Codes of the command and of each pressure.
+Codes = tuple[int, ...]
 SEED, SAMPLES = 11, 3000
 #: A ramp that is not put anywhere; share of the samples before which it is.
 STAYS, PUT_SHARE = -(2**31), 0.04
@@ -28,12 +28,13 @@ STAYS, PUT_SHARE = -(2**31), 0.04
 INVALID = 65535
 #: The dragged point of a play is put as a number from this on; beyond the transition so far apart are the commands.
 PLAYED_SHIFTED, PLAYED_STRIDE = 8192, 61
-FIELDS = ("compare_a", "compare_b", "status", "law", "side", "ticks", "at_rest", "rising", "played", "ramped",
-          "valid_commands", "valid_pressures", "faulty_commands", "faulty_pressures")  # fmt: skip
+FIELDS = ("compare_a", "compare_b", "status", "law", "side", "ticks", "at_rest", "rising", "played", "ramped")
+#: And what is remembered of faults: of the pressures, with a third one, for each side.
+MEMORIES = {2: ("commands", "pressures"), 3: ("commands", "pressures[0]", "pressures[1]")}
 #: Up to so many samples of debounce every state is tried; beyond that those about the ends.
 EVERY_UP_TO = 40
-#: Sound and faulty samples that are remembered of the command, then of the pressures.
-Memory = tuple[int, int, int, int]
+#: Sound and faulty samples that are remembered of each channel: the command, then the pressures.
+Memory = tuple[int, ...]
 #: Most samples at zero command in a row among the random ones, for an interlock that waits for them.
 MOST_AT_ZERO = 60
 
@@ -64,9 +65,9 @@ def drive_samples(compensator: Compensator, seed: int, count: int) -> list[Codes
     low, high = signals.command.valid_codes
     corners = [0, low, high, signals.code_max, signals.code_max + 1, 65535, zero, signals.command.full_code]
     corners += [max(zero + sign * (window + step), 0) for sign in (1, -1) for step in (-1, 0, 1)]
-    valid_pressures = (signals.pressure_a.valid_codes, signals.pressure_b.valid_codes)
-    p_a, p_b = (sum(codes) // 2 for codes in valid_pressures)
-    at_zero = [(zero, p_a, p_b)] * min(compensator.drive_functions.fault_samples, MOST_AT_ZERO)
+    valid_pressures = [sensor.valid_codes for sensor in signals.pressures.values()]
+    middle = [sum(codes) // 2 for codes in valid_pressures]
+    at_zero = [(zero, *middle)] * min(compensator.drive_functions.fault_samples, MOST_AT_ZERO)
     made: list[Codes] = list(at_zero)
     while len(made) < count:
         kind = int(rng.integers(7))
@@ -79,10 +80,10 @@ def drive_samples(compensator: Compensator, seed: int, count: int) -> list[Codes
             end = held if held % 2 else (low, high)[held // 2 % 2]
             command = (anything, int(rng.choice(corners)), held, about_zero, near, end, corner)[kind]
             sound = rng.random() < 0.9
-            p_a, p_b = (int(rng.integers(least, most + 1)) for least, most in valid_pressures)
+            pressures = [int(rng.integers(least, most + 1)) for least, most in valid_pressures]
             if not sound:
-                p_a, p_b = map(int, rng.choice([0, 700, 4014, 4095, 4096, 65535], 2))
-            made.append((command, p_a, p_b))
+                pressures = [int(code) for code in rng.choice([0, 700, 4014, 4095, 4096, 65535], len(pressures))]
+            made.append((command, *pressures))
         if rng.random() < 0.7:
             made += at_zero
     return made[:count]
@@ -141,14 +142,14 @@ def every_state(compensator: Compensator, used: Memory) -> list[Sample]:
 def _with_pressures(compensator: Compensator, code: int, word: int, index: int, used: Memory) -> Sample:
     """Return a command with valid pressures, ever others, and the ramp's place beside the state."""
     signals, functions = compensator.signals, compensator.drive_functions
-    p_a, p_b = (
-        low + index * stride % (high - low + 1)
-        for (low, high), stride in ((signals.pressure_a.valid_codes, 1001), (signals.pressure_b.valid_codes, 619))
-    )
+    ends = [sensor.valid_codes for sensor in signals.pressures.values()]
+    pressures = [
+        low + index * stride % (high - low + 1) for (low, high), stride in zip(ends, (1001, 619, 787), strict=False)
+    ]
     away = signals.command.direction(1) * (code - signals.command.zero_code)
     place = away if len(signals.signs) == 2 else max(away, 0)
     ramped = functions.has_ramp and code != INVALID
-    return Sample((code, p_a, p_b), place * STEP_UNIT if ramped else STAYS, word, None if word == STAYS else used)
+    return Sample((code, *pressures), place * STEP_UNIT if ramped else STAYS, word, None if word == STAYS else used)
 
 
 def state_word(side: int, rest: int, rising: int = 0, played: int = 0) -> int:
@@ -184,22 +185,24 @@ def tried_commands(compensator: Compensator) -> list[int]:
     return sorted(code for code in made if 0 <= code <= 65535)
 
 
-def tried_pressures(compensator: Compensator) -> list[tuple[int, int]]:
-    """Return pairs of pressure codes on either side of every border of the pressures' machine."""
-    a, b = compensator.signals.pressure_a, compensator.signals.pressure_b
-    middle = (sum(a.valid_codes) // 2, sum(b.valid_codes) // 2)
-    made = {middle, (65535, 65535), (0, 0)}
-    for place, sensor in enumerate((a, b)):
+def tried_pressures(compensator: Compensator) -> list[tuple[int, ...]]:
+    """Return codes of the pressures on either side of every border of the pressures' machine."""
+    sensors = compensator.signals.pressures
+    middle = {name: sum(sensor.valid_codes) // 2 for name, sensor in sensors.items()}
+    made = {tuple(middle.values()), (65535,) * len(sensors), (0,) * len(sensors)}
+    for name, sensor in sensors.items():
         low, high = sensor.valid_codes
         for code in (0, low - 1, low, high, high + 1, 65535):
-            made.add((code, middle[1]) if place == 0 else (middle[0], code))
+            made.add(tuple((middle | {name: code}).values()))
     # The plausible difference ends within these codes, whatever the sensors' weights and the side.
     reverse = compensator.reverse_codes
     for sign in compensator.signals.signs:
-        for code in range(a.valid_codes[0], a.valid_codes[1] + 1):
-            if abs(compensator.signals.difference(code, middle[1], sign) + reverse) <= 1:
-                made.add((code, middle[1]))
-    return sorted(pair for pair in made if min(pair) >= 0)
+        pair = compensator.signals.pair(sign)
+        ahead, behind = pair.names
+        for code in range(pair.ahead.valid_codes[0], pair.ahead.valid_codes[1] + 1):
+            if abs(pair.difference(code, middle[behind]) + reverse) <= 1:
+                made.add(tuple((middle | {ahead: code}).values()))
+    return sorted(codes for codes in made if min(codes) >= 0)
 
 
 def every_memory(compensator: Compensator) -> Iterator[Sample]:
@@ -211,21 +214,27 @@ def every_memory(compensator: Compensator) -> Iterator[Sample]:
     signals, needed = compensator.signals, compensator.drive_functions.fault_samples
     others, word = [(needed, 0), (0, 0), (needed - 1, 0)], state_word(signals.signs[-1], 0)
     commands, pressures = tried_commands(compensator), tried_pressures(compensator)
-    sound = next(pair for pair in pressures if _is_sound(compensator, pair))
+    sound = next(codes for codes in pressures if _is_sound(compensator, codes))
+    # With a third pressure both sides' memories by turns, and of the other one by turns what the channels may hold.
+    idle = cycle(others) if len(signals.pressures) > 2 else repeat(())
     for (memory, other), code in product(product(memories(compensator), others), commands):
-        yield Sample((code, *sound), word=word, memory=(*memory, *other))
-    for (memory, other), pair in product(product(memories(compensator), others), pressures):
-        yield Sample((signals.command.full_code, *pair), word=word, memory=(*other, *memory))
-        yield Sample((signals.command.zero_code, *pair), word=word, memory=(*other, *memory))
+        yield Sample((code, *sound), word=word, memory=(*memory, *other, *next(idle)))
+    for (memory, other), codes in product(product(memories(compensator), others), pressures):
+        for command in (signals.command.full_code, signals.command.zero_code):
+            yield Sample((command, *codes), word=word, memory=(*other, *memory, *next(idle)))
+            if len(signals.pressures) > 2:
+                yield Sample((command, *codes), word=word, memory=(*other, *next(idle), *memory))
 
 
-def _is_sound(compensator: Compensator, pair: tuple[int, int]) -> bool:
+def _is_sound(compensator: Compensator, codes: tuple[int, ...]) -> bool:
     signals = compensator.signals
-    sensors = (signals.pressure_a, signals.pressure_b)
+    sound = dict(zip(signals.pressures, codes, strict=True))
     valid = all(
-        sensor.valid_codes[0] <= code <= sensor.valid_codes[1] for sensor, code in zip(sensors, pair, strict=True)
+        sensor.valid_codes[0] <= code <= sensor.valid_codes[1]
+        for sensor, code in zip(signals.pressures.values(), codes, strict=True)
     )
-    return valid and all(signals.difference(*pair, sign) >= 0 for sign in signals.signs[:1])
+    pair = signals.pair(1)
+    return valid and pair.difference(*(sound[name] for name in pair.names)) >= 0
 
 
 class PreparedDrive:
@@ -233,7 +242,7 @@ class PreparedDrive:
 
     def __init__(self, compensator: Compensator, seed: int = SEED, count: int = SAMPLES) -> None:
         signals, needed = compensator.signals, compensator.drive_functions.fault_samples
-        used = (needed, 0, needed, 0)
+        used = (needed, 0) * len(MEMORIES[len(signals.pressures)])
         drawn = zip(drive_samples(compensator, seed, count), ramp_places(compensator, seed, count), strict=True)
         states_put, memories_put = every_state(compensator, used), list(every_memory(compensator))
         samples = [*(Sample(*each) for each in drawn), *states_put, *memories_put]
@@ -253,12 +262,10 @@ class PreparedDrive:
                 states.append(model.state)
         self.codes, self.states = np.array(self.samples, dtype="<u2"), np.array(states, dtype="<i4")
         #: What is put before each sample, as programs/drive.c has it.
-        self.puts = np.array([(each.place, each.word, *_memory_words(each.memory)) for each in samples], dtype="<i4")
-
-
-def _memory_words(memory: Memory | None) -> tuple[int, int]:
-    """Return the sound and the faulty samples that are put, those of command and pressures in one word."""
-    return (STAYS, STAYS) if memory is None else (memory[0] | memory[2] << 15, memory[1] | memory[3] << 15)
+        nothing = (STAYS,) * len(used)
+        self.puts = np.array([(each.place, each.word, *(each.memory or nothing)) for each in samples], dtype="<i4")
+        names = MEMORIES[len(signals.pressures)]
+        self.fields = (*FIELDS, *(f"{kind}_{name}" for kind in ("valid", "faulty") for name in names))
 
 
 def _put(model: DriveModel, sample: Sample) -> None:
@@ -268,8 +275,9 @@ def _put(model: DriveModel, sample: Sample) -> None:
     if sample.word != STAYS:
         model.rising, model.side, model.at_rest, model.played = state_of(sample.word)
     if sample.memory:
-        model.commands.sound, model.commands.faulty = sample.memory[:2]
-        model.pressures.sound, model.pressures.faulty = sample.memory[2:]
+        channels = (model.commands, *model.pressures.values())
+        for channel, sound, faulty in zip(channels, sample.memory[::2], sample.memory[1::2], strict=False):
+            channel.sound, channel.faulty = sound, faulty
 
 
 class CompiledDrive:
@@ -310,7 +318,7 @@ class CompiledDrive:
         if wrong:
             sample = (tick - 1) // prepared.ticks_per_sample - 1
             when = f"sample {sample} with codes {prepared.samples[sample]}" if sample >= 0 else "before any sample"
-            words = f"{FIELDS[field]} after {tick} PWM periods, {when}"
+            words = f"{prepared.fields[field]} after {tick} PWM periods, {when}"
         return DriveCheck(ticks=ticks, faults=wrong, first_wrong=words)
 
 

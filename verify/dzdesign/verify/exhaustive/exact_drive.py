@@ -5,6 +5,10 @@ ramps hold back, it counts as zero until it leaves the zero band, the side chang
 the dither is a square wave about the law. A fault of an input acts from its first sample on, and is over with the
 declared number of sound samples in a row, the last of which is used again. Where faults are latched, the declared
 number of faulty samples, with no such row between them, stays.
+
+Each side has the two pressures of its own edge. With a third pressure these differ, and each side has a memory of its
+own: of the side that is driven what is wrong with its pressures and their difference counts, of the other one only
+whether each of its pressures is a sound signal.
 """
 
 from dataclasses import dataclass, field
@@ -12,6 +16,7 @@ from fractions import Fraction
 from math import floor
 
 from dzdesign.design.compensator import Compensator
+from dzdesign.verify.exhaustive.exact_law import PRESSURES
 
 #: Seconds and steps of a ramp are held as codes over this.
 STEP_UNIT = 65536
@@ -89,18 +94,21 @@ class DriveModel:
         needed, latches = functions.fault_samples, functions.fault_latch
         #: What is remembered of the faults of the command and of the pressures: with an interlock a reset is one.
         self.commands = FaultMemory(needed, latches, needed if functions.interlock_codes is None else 0)
-        self.pressures = FaultMemory(needed, latches, needed)
+        both = FaultMemory(needed, latches, needed)
+        three = self.compensator.signals.pressure_c is not None
+        self.pressures = {1: both, -1: FaultMemory(needed, latches, needed) if three else both}
         self._turn_at_zero()
 
-    def sample(self, command: int, p_a: int, p_b: int) -> None:
-        """Take new codes."""
+    def sample(self, command: int, *pressures: int) -> None:
+        """Take new codes, of the command and of each pressure."""
+        self._codes = dict(zip(PRESSURES, pressures, strict=False))
         signals, functions = self.compensator.signals, self.compensator.drive_functions
         low, high = signals.command.valid_codes
         away = signals.command.direction(1) * (command - signals.command.zero_code)
         early = not self.commands.usable and not command_counts_as_zero(self.compensator, away)
         self.commands.take(fault=not low <= command <= high, unwanted=early)
         if not self.commands.usable:
-            self._watch(command, p_a, p_b, 1)
+            self._watch(command, 1)
             self.law, self.side, self.position = 0, 0 if self.both else 1, Fraction(0)
             self.at_rest = self.has_rest
             self._turn_at_zero()
@@ -116,8 +124,8 @@ class DriveModel:
         if self.at_rest or self.side != driven:
             self._turn_at_zero()
         code = signals.command.zero_code + signals.command.direction(1) * away
-        self._watch(command, p_a, p_b, self.side or 1)
-        self.law = self._law(code, p_a, p_b) if self.side else 0
+        self._watch(command, self.side or 1)
+        self.law = self._law(code) if self.side else 0
         if functions.has_play and self.side and not self.at_rest:
             self.law = max(self.law - floor(self._lowered_by_play(away * self.side)), 0)
 
@@ -174,35 +182,44 @@ class DriveModel:
             way = step if way > 0 else -step
         self.position += way
 
-    def _watch(self, command: int, p_a: int, p_b: int, sign: int) -> None:
+    def _watch(self, command: int, sign: int) -> None:
         """Take the pressures' part of a sample, and say what is wrong with all of it."""
-        found = self._status(command, p_a, p_b, sign)
-        self.pressures.take(fault=found // 2 % 8 > 0)
-        latched = self.commands.is_latched or self.pressures.is_latched
-        waits, held = not self.commands.usable, not self.pressures.usable
-        self.status = found + WAITING * waits + HELD * held + LATCHED * latched
+        low, high = self.compensator.signals.command.valid_codes
+        own, other = self.pressures[sign], self.pressures[-sign]
+        unsound = self._unsound(sign)
+        reversed_, above = (False, False) if unsound else self._drop_is_odd(sign)
+        own.take(fault=bool(unsound) or reversed_)
+        if other is not own:
+            idle = self._unsound(-sign)
+            other.take(fault=bool(idle))
+            unsound |= idle
+        latched = self.commands.is_latched or own.is_latched
+        waits, held = not self.commands.usable, not own.usable
+        self.status = (not low <= command <= high) + sum(PRESSURES[name] for name in unsound) + 8 * reversed_
+        self.status += 16 * above + WAITING * waits + HELD * held + LATCHED * latched
 
-    def _sound(self, p_a: int, p_b: int) -> tuple[bool, bool]:
+    def _unsound(self, sign: int) -> set[str]:
+        """Return the pressures of a side whose codes no sound signal makes."""
         signals = self.compensator.signals
-        (a_low, a_high), (b_low, b_high) = signals.pressure_a.valid_codes, signals.pressure_b.valid_codes
-        return a_low <= p_a <= a_high, b_low <= p_b <= b_high
+        ends = {name: signals.pressures[name].valid_codes for name in signals.pair(sign).names}
+        return {name for name, (low, high) in ends.items() if not low <= self._codes[name] <= high}
 
-    def _status(self, command: int, p_a: int, p_b: int, sign: int) -> int:
-        signals = self.compensator.signals
-        low, high = signals.command.valid_codes
-        a, b = self._sound(p_a, p_b)
-        reversed_ = a and b and signals.difference(p_a, p_b, sign) < -self.compensator.reverse_codes
-        last_MPa = self.compensator.side(sign).certificate.dp_MPa[1]
-        drop_MPa = signals.difference(p_a, p_b, sign) * signals.pressure_a.per_code_MPa
+    def _drop(self, sign: int) -> int:
+        """Return the pressure drop of a side, in codes."""
+        pair = self.compensator.signals.pair(sign)
+        return pair.difference(*(self._codes[name] for name in pair.names))
+
+    def _drop_is_odd(self, sign: int) -> tuple[bool, bool]:
+        """Tell whether the drop of sound pressures is too far below zero, and whether it lies above the tests."""
+        drop, last_MPa = self._drop(sign), self.compensator.side(sign).certificate.dp_MPa[1]
         # Of whole codes the first above the last test is one that stands for more than it.
-        above = a and b and drop_MPa > last_MPa
-        return (not low <= command <= high) + 2 * (not a) + 4 * (not b) + 8 * reversed_ + 16 * above
+        above = drop * self.compensator.signals.pair(sign).ahead.per_code_MPa > last_MPa
+        return drop < -self.compensator.reverse_codes, above
 
-    def _law(self, code: int, p_a: int, p_b: int) -> int:
+    def _law(self, code: int) -> int:
         failed = -self.compensator.reverse_codes - 1
-        difference = self.compensator.signals.difference(p_a, p_b, self.side)
-        usable = self.pressures.usable and all(self._sound(p_a, p_b))
-        return self.compensator.compare(code, difference if usable else failed, self.side)
+        usable = self.pressures[self.side].usable and not self._unsound(self.side)
+        return self.compensator.compare(code, self._drop(self.side) if usable else failed, self.side)
 
     def tick(self) -> None:
         """Go one PWM period on."""
@@ -226,5 +243,7 @@ class DriveModel:
         """Everything that `struct dz_drive` holds, in its order."""
         ramped = self.position * STEP_UNIT
         play = (self.rising, self.played)
-        faults = (self.commands.sound, self.pressures.sound, self.commands.faulty, self.pressures.faulty)
+        pressures = list({id(each): each for each in self.pressures.values()}.values())
+        faults = (self.commands.sound, *(each.sound for each in pressures))
+        faults += (self.commands.faulty, *(each.faulty for each in pressures))
         return (*self.outputs, self.law, self.side, self.tick_of_wave, int(self.at_rest), *play, int(ramped), *faults)

@@ -18,11 +18,13 @@ from dzdesign.derivation.scaling import evaluate_line
 from dzdesign.design.compensator import Compensator
 from dzdesign.verify.loop_results import Side
 
-#: What sensor B's weight is stated over, where the two sensors count unlike (DESIGN: codes of A over 2^12).
+#: What the weight of the sensor behind is stated over, where the two sensors count unlike (codes ahead over 2^12).
 WEIGHT_UNIT = 4096
 #: What dz_beta() multiplies beta by, rounding down; bits of the status.
 BETA_UNIT = 2**15
-COMMAND, PRESSURE_A, PRESSURE_B, DIFFERENCE, ABOVE = 1, 2, 4, 8, 16
+COMMAND, DIFFERENCE, ABOVE = 1, 8, 16
+#: The bit of each pressure input.
+PRESSURES = {"A": 2, "B": 4, "C": 512}
 
 
 class Betas(NamedTuple):
@@ -61,33 +63,36 @@ class ExactLaw:
         self.along, self.span = command.direction(sign), command.span(sign)
         self.full = self.zero + self.along * self.span
         self.sound_commands = range(command.valid_codes[0], command.valid_codes[1] + 1)
-        self.a, self.b = signals.pressure_a, signals.pressure_b
+        #: Names of the pressure inputs ahead and behind, their sensors, and their bits of the status.
+        self.pair = signals.negative_pair if sign < 0 else "AB"
+        sensors = {"A": signals.pressure_a, "B": signals.pressure_b, "C": signals.pressure_c or signals.pressure_a}
+        self.ahead, self.behind = (sensors[name] for name in self.pair)
+        self.bits = tuple(PRESSURES[name] for name in self.pair)
         self.reverse = compensator.reverse_codes
         # A code above the last test's own says that the pressure drop lies above the tests.
-        self.tested_to = floor(side.certificate.dp_MPa[1] / self.a.per_code_MPa)
-        self.turn = -1 if sign < 0 and signals.swapped else 1
+        self.tested_to = floor(side.certificate.dp_MPa[1] / self.ahead.per_code_MPa)
         self.zero_band, self.transition_end = compensator.zero_band_codes, compensator.transition_end
         self._law = law(compensator.law)
         self._kappa, self._u_min0 = side.drive_range_over_u_max, side.u_min0_over_u_max
         self._zero_nodes, self._law_nodes = side.beta, side.law_beta
         self._denominator, self._step = compensator.beta_denominator, compensator.beta_step_codes
-        self._weight = max(1, round(self.b.per_code_MPa / self.a.per_code_MPa * WEIGHT_UNIT))
+        self._weight = max(1, round(self.behind.per_code_MPa / self.ahead.per_code_MPa * WEIGHT_UNIT))
 
     def from_zero(self, code: int) -> int:
         """Return how far a command is from zero towards full, in codes, limited to both."""
         return min(max(self.along * (code - self.zero), 0), self.span)
 
-    def difference(self, p_a: np.ndarray, p_b: np.ndarray) -> np.ndarray:
-        """Return the differences of pressure codes, in codes of sensor A, that pairs of codes make (rounded down)."""
-        a = np.asarray(p_a, dtype=np.int64) - self.a.zero_code
-        b = np.asarray(p_b, dtype=np.int64) - self.b.zero_code
-        differences: np.ndarray = np.floor_divide(self.turn * (a * WEIGHT_UNIT - b * self._weight), WEIGHT_UNIT)
+    def difference(self, p_ahead: np.ndarray, p_behind: np.ndarray) -> np.ndarray:
+        """Return the differences of pressure codes, in codes of the sensor ahead, that pairs make (rounded down)."""
+        ahead = np.asarray(p_ahead, dtype=np.int64) - self.ahead.zero_code
+        behind = np.asarray(p_behind, dtype=np.int64) - self.behind.zero_code
+        differences: np.ndarray = np.floor_divide(ahead * WEIGHT_UNIT - behind * self._weight, WEIGHT_UNIT)
         return differences
 
     def slant(self) -> np.ndarray:
-        """Return, per pressure code b, what a difference d is short of pressure code a: a = turn * d + slant[b]."""
-        away = (np.arange(self.code_max + 1) - self.b.zero_code) * self._weight
-        return self.a.zero_code - self.turn * np.floor_divide(-self.turn * away, WEIGHT_UNIT)
+        """Return, per code b behind, what a difference d is short of the code a ahead: a = d + slant[b]."""
+        away = (np.arange(self.code_max + 1) - self.behind.zero_code) * self._weight
+        return self.ahead.zero_code - np.floor_divide(-away, WEIGHT_UNIT)
 
     def betas(self, dp_code: int) -> Betas:
         """Return both betas at a difference; one below ``-reverse`` says that the signal can't be right."""
@@ -137,14 +142,14 @@ class ExactLaw:
         counts = start + (end - start) * Fraction(away - first, last - first)
         return min(max((counts + Fraction(1, 2)).__floor__(), 0), self.compare_limit)
 
-    def answer(self, u: int, a: int, b: int) -> Answer:
+    def answer(self, u: int, ahead: int, behind: int) -> Answer:
         """Return what the law gives for any codes of command and sensors."""
-        (a_low, a_high), (b_low, b_high) = self.a.valid_codes, self.b.valid_codes
         status = COMMAND * (u not in self.sound_commands)
-        status |= PRESSURE_A * (not a_low <= a <= a_high) | PRESSURE_B * (not b_low <= b <= b_high)
+        for code, sensor, bit in zip((ahead, behind), (self.ahead, self.behind), self.bits, strict=True):
+            status |= bit * (not sensor.valid_codes[0] <= code <= sensor.valid_codes[1])
         drop = -self.reverse - 1  # of pressures that can't be right
-        if not status & (PRESSURE_A | PRESSURE_B):
-            drop = int(self.difference(np.array(a), np.array(b)))
+        if not status & sum(self.bits):
+            drop = int(self.difference(np.array(ahead), np.array(behind)))
             status |= DIFFERENCE * (drop < -self.reverse) | ABOVE * (drop > self.tested_to)
         corners, beta = self._at_drop(drop)
         return Answer(0 if status & COMMAND else self.compare_value(u, corners), status, beta)

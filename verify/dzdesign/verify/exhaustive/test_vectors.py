@@ -11,7 +11,7 @@ import numpy as np
 
 from dzdesign.core.errors import RequirementError
 from dzdesign.verify.exhaustive.exact_drive import HELD, LATCHED, STEP_UNIT
-from dzdesign.verify.exhaustive.exact_law import BETA_UNIT, DIFFERENCE, ExactLaw
+from dzdesign.verify.exhaustive.exact_law import BETA_UNIT, DIFFERENCE, PRESSURES, ExactLaw
 from dzdesign.verify.toolchain.compiled_core import DIRECTION, PAIR, PART, PLAN, ROW
 
 #: Codes beyond the converter's range: the largest that 16 bits hold.
@@ -32,10 +32,10 @@ class Differences:
 
     #: (D,): differences, rising by one.
     values: np.ndarray
-    #: (D,): codes of sensor B of the first and last pair, all between them belong to one pair. None: last < first.
+    #: (D,): codes behind of the first and last pair, all between them belong to one pair. None: last < first.
     b_first: np.ndarray
     b_last: np.ndarray
-    #: By code of sensor B: code of sensor A less turn * difference.
+    #: By code behind: code ahead less the difference.
     slant: np.ndarray
 
     @property
@@ -52,12 +52,12 @@ class Differences:
 def differences(exact: ExactLaw) -> Differences:
     """Return every difference that sound pressure codes make."""
     slant = exact.slant()
-    (a_low, a_high), (b_low, b_high) = exact.a.valid_codes, exact.b.valid_codes
+    (a_low, a_high), (b_low, b_high) = exact.ahead.valid_codes, exact.behind.valid_codes
     sound = slant[b_low : b_high + 1]  # never falls: along a difference both codes rise together
-    ends = sorted(exact.turn * (a - s) for a in (a_low, a_high) for s in (sound[0], sound[-1]))
+    ends = sorted(a - s for a in (a_low, a_high) for s in (sound[0], sound[-1]))
     values = np.arange(ends[0], ends[-1] + 1)
-    first = np.searchsorted(sound, a_low - exact.turn * values, side="left")
-    last = np.searchsorted(sound, a_high - exact.turn * values, side="right") - 1
+    first = np.searchsorted(sound, a_low - values, side="left")
+    last = np.searchsorted(sound, a_high - values, side="right") - 1
     return Differences(values=values, b_first=b_low + first, b_last=b_low + last, slant=slant)
 
 
@@ -126,7 +126,7 @@ class PreparedInputs:
         """Return the command's codes at some places, each with pressure codes of some rows and with ones not sound."""
         found, rows = self.differences, self.sampled_rows()
         b = found.b_first[rows]
-        pairs = [*zip((self.exact.turn * found.values[rows] + found.slant[b]).tolist(), b.tolist(), strict=True)]
+        pairs = [*zip((found.values[rows] + found.slant[b]).tolist(), b.tolist(), strict=True)]
         pairs += self._fallback_pairs()[["a", "b"]].tolist()
         return [(self.code_at(place), *pair) for place in self.sampled_places().tolist() for pair in pairs]
 
@@ -177,7 +177,7 @@ class PreparedInputs:
     def _rows(self) -> np.ndarray:
         found = self.differences
         rows = np.zeros(found.values.size, dtype=ROW)
-        rows["offset"] = self.exact.turn * found.values
+        rows["offset"] = found.values
         rows["pairs"] = np.maximum(found.b_last - found.b_first + 1, 0)
         rows["b_low"] = np.where(found.made, found.b_first, 0)
         rows["first"] = np.arange(rows.size) * SPREAD % np.maximum(rows["pairs"], 1)
@@ -209,7 +209,7 @@ class PreparedInputs:
     def _fallback_pairs(self) -> np.ndarray:
         """Return pressure codes of which one or both are not sound, then sound ones; ends and middles."""
         inside, outside = [], []
-        for sensor in (self.exact.a, self.exact.b):
+        for sensor in (self.exact.ahead, self.exact.behind):
             low, high = sensor.valid_codes
             inside.append((low, (low + high) // 2, high))
             outside.append(tuple(code for code in (low - 1, high + 1, OUTSIDE) if code >= 0))
@@ -240,7 +240,6 @@ class PreparedInputs:
             "zero_place": self._zero_place,
             "zero_code": exact.zero,
             "compare_limit": exact.compare_limit,
-            "turn": exact.turn,
             "reverse": exact.reverse,
             "tested_to": exact.tested_to,
             "dither_counts": functions.dither_counts,
@@ -256,8 +255,11 @@ class PreparedInputs:
             "places": places.size,
             "stride": stride,
         }
-        values |= dict(zip(("a_low", "a_high"), exact.a.valid_codes, strict=True))
-        values |= dict(zip(("b_low", "b_high"), exact.b.valid_codes, strict=True))
+        values |= dict(zip(("a_low", "a_high"), exact.ahead.valid_codes, strict=True))
+        values |= dict(zip(("b_low", "b_high"), exact.behind.valid_codes, strict=True))
+        other = next(name for name in PRESSURES if name not in exact.pair)
+        for end, name in zip(("ahead", "behind", "other"), (*exact.pair, other), strict=True):
+            values |= {f"{end}_input": list(PRESSURES).index(name), f"{end}_bit": PRESSURES[name]}
         pairs = self._fallback_pairs()
         values["pairs"] = pairs.size
         tables = {

@@ -89,17 +89,16 @@ class PressureDrops:
 def pressure_drops(exact: ExactLaw, found: Differences, tested_MPa: Iterable[Fraction]) -> PressureDrops:
     """Return the pressure drops of all differences, over a scale by which the tested ones are whole numbers, too."""
     tested = set(tested_MPa)
+    ahead, behind = exact.ahead, exact.behind
     a_MPa, b_MPa, (a_least, a_most), (b_least, b_most) = (
-        exact.a.per_code_MPa, exact.b.per_code_MPa, exact.a.error_MPa, exact.b.error_MPa,
+        ahead.per_code_MPa, behind.per_code_MPa, ahead.error_MPa, behind.error_MPa,
     )  # fmt: skip
-    ends = sorted(exact.turn * error for error in (a_least - b_most, a_most - b_least))
+    ends = (a_least - b_most, a_most - b_least)
     scale = lcm(*(value.denominator for value in (a_MPa, b_MPa, *ends, *tested)))
     a_unit, b_unit = int(a_MPa * scale), int(b_MPa * scale)
-    # A pair's drop is turn ((a - a0) a_MPa - (b - b0) b_MPa), and a - a0 is turn (difference) + slant[b] - a0.
+    # A pair's drop is (a - a0) a_MPa - (b - b0) b_MPa, and a - a0 is the difference + slant[b] - a0.
     codes = np.arange(found.slant.size, dtype=object)
-    rest = exact.turn * (
-        (found.slant.astype(object) - exact.a.zero_code) * a_unit - (codes - exact.b.zero_code) * b_unit
-    )
+    rest = (found.slant.astype(object) - ahead.zero_code) * a_unit - (codes - behind.zero_code) * b_unit
     values = found.values.astype(object) * a_unit
     first, last = np.minimum(found.b_first, codes.size - 1), np.maximum(found.b_last, found.b_first)
     least = values + _extreme(rest, first, last, np.minimum) + int(ends[0] * scale)

@@ -3,6 +3,7 @@
 What a pin must do follows from the exact law and the exact drive, from the voltages on the declared channels.
 """
 
+from bisect import bisect_left
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -11,6 +12,7 @@ from itertools import pairwise
 from math import ceil
 
 from dzdesign.core.errors import RequirementError
+from dzdesign.design.current.circuit import CurrentLoop
 from dzdesign.verify import requirements
 from dzdesign.verify.exhaustive.exact_drive import STEP_UNIT, DriveModel
 from dzdesign.verify.hardware.exact_current import ExactCurrent
@@ -26,15 +28,16 @@ STAYS_LOW_US = 12_000.0
 LATER_US = 2e6
 #: Bits of the faults, as dz_hardware.h states them.
 NO_SAMPLE, TRIP_INPUT, WATCHDOG, CLOCK, NO_CURRENT = 1, 2, 4, 8, 16
+#: Of what programs/scenario.c says of a current.
+HELD_PER_A = 1e4
 #: PWM periods of each compare value that is written.
 WRITTEN_PERIODS = 4
 #: PWM periods after which an output is released at the latest, once the trip input is high.
 RELEASE_PERIODS = 6
 #: Least and most samples of each set of codes; in between so many that a ramp goes this share of the command.
 SAMPLES_OF_CODES, RAMPED = (5, 200), 0.06
-#: Codes, of command, pressure A and pressure B; and what carries them.
-Codes = tuple[int, int, int]
-INPUTS = ("COMMAND", "PRESSURE_A", "PRESSURE_B")
+#: Codes, of the command and of each pressure.
+Codes = tuple[int, ...]
 
 
 @dataclass
@@ -47,18 +50,27 @@ class HardwareRuns:
         self.signals, self.compensator = self.bench.compensator.signals, self.bench.compensator
         self.drive = self.compensator.current_drive
         self.period_us, self.sample_us = 1e6 / self.signals.tick_Hz, 1e6 / self.signals.sample_Hz
-        wait = self.drive.rest_ticks + 2**self.drive.loop.offset_shift if self.drive else 0
+        wait = self.drive.rest_ticks + self.drive.loop.offset_ticks if self.drive else 0
         #: When the output is released at the latest, after the start.
         self.released_us = (wait + 2) * self.period_us + 2 * self.sample_us
 
     # ---- what is on the channels ----
 
     @cached_property
-    def pressures(self) -> list[tuple[int, int]]:
-        """Pairs of valid codes, no two differences alike, and none of them its own mirror image."""
-        shares = ((0.6, 0.2), (0.3, 0.1), (0.5, 0.25))
-        (a_low, a_high), (b_low, b_high) = self.signals.pressure_a.valid_codes, self.signals.pressure_b.valid_codes
-        return [(a_low + round(a * (a_high - a_low)), b_low + round(b * (b_high - b_low))) for a, b in shares]
+    def inputs(self) -> tuple[str, ...]:
+        """What carries the codes: roles of the channels."""
+        return ("COMMAND", *(f"PRESSURE_{name}" for name in self.signals.pressures))
+
+    @cached_property
+    def pressures(self) -> list[Codes]:
+        """Valid codes, no two differences alike, and none of them its own mirror image; with C no drop below zero."""
+        third = {"BC": (0.1, 0.02, 0.17), "CA": (0.8, 0.45, 0.7)}.get(self.signals.negative_pair, (0.4, 0.22, 0.35))
+        shares = zip((0.6, 0.3, 0.5), (0.2, 0.1, 0.25), third, strict=True)
+        ends = [sensor.valid_codes for sensor in self.signals.pressures.values()]
+        return [
+            tuple(low + round(share * (high - low)) for share, (low, high) in zip(each, ends, strict=False))
+            for each in shares
+        ]
 
     @cached_property
     def followed(self) -> list[tuple[float, Codes]]:
@@ -68,6 +80,8 @@ class HardwareRuns:
         functions = self.compensator.drive_functions
         at_us = self.released_us + (functions.fault_samples + 2.5) * self.sample_us
         least, most = SAMPLES_OF_CODES
+        if self.drive and self.drive.loop.two:  # longer than a change from one solenoid to the other
+            least += ceil(self.drive.change_s * self.signals.sample_Hz)
         slowest = min((step for step in functions.ramp_up + functions.ramp_down if step), default=0)
         ramped = ceil(RAMPED * command.span(1) * STEP_UNIT / slowest) if slowest else least
         self.set_us = min(max(ramped, least), most) * self.sample_us
@@ -86,16 +100,14 @@ class HardwareRuns:
 
     def codes(self, at_us: float, codes: Codes) -> list[Step]:
         """Return the steps that put codes on the declared channels."""
-        return [Step(at_us, "code", self.bench.channels[role], code) for role, code in zip(INPUTS, codes, strict=True)]
+        channels = [self.bench.channels[role] for role in self.inputs]
+        return [Step(at_us, "code", channel, code) for channel, code in zip(channels, codes, strict=True)]
 
     def at_rest(self) -> list[Step]:
         """Return the steps for valid codes, and no current."""
         steps = self.codes(-1.0, self.followed[0][1])
-        return steps + (
-            [Step(-1.0, "code", self.bench.channels["CURRENT"], self.zero_current), *self.supply()]
-            if self.drive
-            else []
-        )
+        currents = [Step(-1.0, "code", channel, self.zero_current) for channel in self.bench.shunts]
+        return steps + currents + self.supply()
 
     @property
     def zero_current(self) -> int:
@@ -114,16 +126,24 @@ class HardwareRuns:
         low, high = self.drive.loop.supply.valid_codes if self.drive and self.drive.loop.supply else (0, 0)
         return (low + high) // 2
 
+    @property
+    def codes_per_A(self) -> float:
+        """Codes of the current's sensor for a current."""
+        converter = self.compensator.target.converter if self.compensator.target else None
+        codes_per_V = float(converter.levels / converter.full_V) if converter else 4096 / 3
+        return self.drive.sensor.V_per_A * codes_per_V if self.drive else 0.0
+
     def coil(self) -> list[Step]:
         """Return the steps for the declared solenoid, through which the rated current flows at first."""
         if self.drive is None:
             return []
-        circuit, sensor = self.drive.circuit, self.drive.sensor
-        converter = self.compensator.target.converter if self.compensator.target else None
-        codes_per_V = float(converter.levels / converter.full_V) if converter else 4096 / 3
+        circuit = self.drive.circuit
         return [
-            Step(-1.0, "coil", self.bench.channels["CURRENT"], self.bench.pins[0]),
-            Step(-1.0, "sensor", sensor.V_per_A * codes_per_V, self.zero_current + 0.5),
+            *(
+                Step(-1.0, "coil", self.bench.shunts[output % len(self.bench.shunts)], gpio)
+                for output, gpio in enumerate(self.bench.pins)
+            ),
+            Step(-1.0, "sensor", self.codes_per_A, self.zero_current + 0.5),
             Step(-1.0, "winding", circuit.nominal.resistance_ohm, circuit.nominal.inductance_H),
             Step(-1.0, "supply", circuit.nominal.supply_V, circuit.freewheel_V),
             Step(-1.0, "flows", circuit.rated_A),
@@ -172,7 +192,7 @@ class HardwareRuns:
 
     def channel_words(self, codes: Codes) -> str:
         """Name the codes of a sample with their channels."""
-        return ", ".join(f"{code} on {self.bench.names[role]}" for role, code in zip(INPUTS, codes, strict=True))
+        return ", ".join(f"{code} on {self.bench.names[role]}" for role, code in zip(self.inputs, codes, strict=True))
 
     def period(self, trace: Trace) -> int:
         """Return the counts of a PWM period at the clock of the device."""
@@ -190,11 +210,10 @@ class HardwareRuns:
         trace, found = self.following, list[Due]()
         times = [(trace.count_at(at_us) if at_us > 0 else 0, codes) for at_us, codes in self.followed]
         current = ExactCurrent(self.drive, self.supply_code) if self.drive else None
-        own = self.bench.channels.get("CURRENT") if self.drive else None
         model, codes, fresh = None, self.followed[0][1], False
         for each in trace.events:
-            if each.word == "hold" and each.one == own and current:
-                current.take(each.two)
+            if each.word == "hold" and each.one in self.bench.shunts and current:
+                current.take(each.two, self.bench.shunts.index(each.one))
             elif each.word == "hold":
                 fresh, codes = True, [given for at, given in times if at <= each.at][-1]
             elif each.word == "interrupt":
@@ -204,8 +223,8 @@ class HardwareRuns:
                     model.sample(*codes)
                 if model:
                     model.tick()
-                set_point, b, status = model.outputs if model else (0, 0, 0)
-                compares = (current.tick(set_point) if current else set_point, b)
+                a, b, status = model.outputs if model else (0, 0, 0)
+                compares = current.tick(a, b) if current else (a, b)
                 found.append(Due(codes, compares, model.side if model else 0, status, model is not None))
                 fresh = False
         return found
@@ -279,7 +298,7 @@ def _reaches(runs: HardwareRuns) -> str:
     trace = runs.following
     period, held = runs.period(trace), {each.one for each in trace.events if each.word == "hold"}
     for role, channel in runs.bench.channels.items():
-        used = role in INPUTS or (runs.drive and (role == "CURRENT" or runs.drive.loop.supply))
+        used = role in runs.inputs or channel in runs.bench.shunts or (runs.drive and runs.drive.loop.supply)
         if used and channel not in held:
             return f"{runs.bench.names[role]}, declared for the {role.lower().replace('_', ' ')}, is never converted"
     pins = [(gpio, trace.pin(gpio)) for gpio in runs.bench.pins]
@@ -349,17 +368,17 @@ def _tells(runs: HardwareRuns) -> str:
 
 
 def _loses_samples(runs: HardwareRuns) -> str:
-    sampled = [role for role in runs.bench.channels if role != "CURRENT"]
-    for cause, fault, roles in (
+    sampled = [channel for role, channel in runs.bench.channels.items() if not role.startswith("CURRENT")]
+    for cause, fault, channels in (
         ("samples were lost", NO_SAMPLE, sampled),
-        ("codes of the current were lost", NO_CURRENT, ["CURRENT"]),
+        ("codes of the current were lost", NO_CURRENT, runs.bench.shunts),
     ):
-        if "CURRENT" in roles and runs.drive is None:
+        if not channels:
             continue
         again_us = runs.happens_us + SAMPLE_LOSS_S * 1e6
         steps = [
-            Step(at_us, "converter", hears, runs.bench.channels[role])
-            for role in roles
+            Step(at_us, "converter", hears, channel)
+            for channel in channels
             for at_us, hears in ((runs.happens_us, 0), (again_us, 1))
         ]
         if found := _switched_off(runs, SAMPLE_LOSS_S, fault, cause, *steps):
@@ -413,6 +432,18 @@ def _never_both(runs: HardwareRuns) -> str:
         for at in sorted({*first.times, *second.times}):
             if first.level_at(at) != LOW and second.level_at(at) != LOW:
                 return f"GPIO{one} and GPIO{other} are high at once, {trace.ms_of(at):.2f} ms after the start"
+    return _held_off(runs, runs.drive.loop, runs.following) if runs.drive else ""
+
+
+def _held_off(runs: HardwareRuns, loop: CurrentLoop, trace: Trace) -> str:
+    """Return when a pin goes high while a current flows in the other one's solenoid."""
+    allowed_A, start = (loop.open_sum / loop.samples + 1) / runs.codes_per_A, trace.start
+    for each in trace.events:
+        if each.word == "held" and each.at > start and each.two > HELD_PER_A * allowed_A:
+            return (
+                f"{each.two / HELD_PER_A:.3f} A flow in the solenoid of GPIO{each.one} as the other one is switched on "
+                f"{trace.ms_of(each.at):.2f} ms after the start, expected {allowed_A:.3f} at most"
+            )
     return ""
 
 
@@ -422,17 +453,18 @@ def _samples_the_current(runs: HardwareRuns) -> str:
     if sampling is None:
         return ""
     period, parts = runs.period(trace), sampling.samples
-    begins = sorted(set(runs.frames(trace)))
-    holds = trace.times("hold", runs.bench.channels["CURRENT"])
+    begins, interrupts = sorted(set(runs.frames(trace))), trace.times("interrupt")
+    shunts = runs.bench.shunts
+    holds = [each.at for each in trace.events if each.word == "hold" and each.one in shunts]
     for begin in begins[1:-1]:
-        taken = [at - begin for at in holds if begin <= at < begin + period]
+        taken = [at - begin for at in holds[bisect_left(holds, begin) : bisect_left(holds, begin + period)]]
         wanted = [(2 * part + 1) * period // (2 * parts) for part in range(parts)]
         if len(taken) != parts or any(abs(at - due) > 2 for at, due in zip(taken, wanted, strict=True)):
             places = ", ".join(f"{1e6 * at / trace.clock_Hz:.1f}" for at in taken) or "none"
             return (
                 f"the current is sampled {places} us after a period began, expected the middles of {parts} equal parts"
             )
-        interrupt = next((at - begin for at in trace.times("interrupt") if begin <= at < begin + period), 0)
+        interrupt = next((at - begin for at in interrupts[bisect_left(interrupts, begin) :][:1]), 0)
         before = sum(at < interrupt for at in taken)
         if before != sampling.before:
             return f"{before} codes of the current come before the interrupt, expected {sampling.before}"
@@ -467,7 +499,7 @@ def hardware_checks(make: Callable[[], Bench]) -> Iterator[Check]:
     figures = {
         "pins": " and ".join(f"GPIO{gpio}" for gpio in bench.pins), "tick_Hz": signals.tick_Hz,
         "sample_Hz": signals.sample_Hz, "full": signals.compare_max, "sets": len(runs.followed),
-        "names": ", ".join(bench.names[role] for role in INPUTS), "watchdog_ms": 1e3 * bench.watchdog_s,
+        "names": ", ".join(bench.names[role] for role in runs.inputs), "watchdog_ms": 1e3 * bench.watchdog_s,
         "trip": bench.board["TRIP_GPIO"], "line": bench.board.get("SCI_TX_GPIO"),
         "parts": runs.drive.sampling.samples if runs.drive else 0,
     }  # fmt: skip

@@ -3,7 +3,7 @@
 import re
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
@@ -79,7 +79,7 @@ class Event(NamedTuple):
 class Due(NamedTuple):
     """What an interrupt must leave: codes of the last sample, compare values, the drive's side and its status."""
 
-    codes: tuple[int, int, int]
+    codes: tuple[int, ...]
     compares: tuple[int, int]
     side: int
     status: int
@@ -121,6 +121,7 @@ class Trace:
     clock_Hz: int
     events: tuple[Event, ...]
     early: tuple[Event, ...]
+    _pins: dict[int, Pin] = field(default_factory=dict)
 
     def times(self, word: str, one: int | None = None) -> list[int]:
         """Return when something happened."""
@@ -145,10 +146,12 @@ class Trace:
         return 1e3 * (at - self.start) / self.clock_Hz
 
     def pin(self, gpio: int) -> Pin:
-        """Return the levels of a pin."""
-        early = [each.two for each in self.early if (each.word, each.one) == ("pin", gpio)]
-        own = [each for each in self.events if (each.word, each.one) == ("pin", gpio)]
-        return Pin(own, early[-1] if early else LOW)
+        """Return the levels of a pin; kept, because they are asked for in each period."""
+        if gpio not in self._pins:
+            early = [each.two for each in self.early if (each.word, each.one) == ("pin", gpio)]
+            own = [each for each in self.events if (each.word, each.one) == ("pin", gpio)]
+            self._pins[gpio] = Pin(own, early[-1] if early else LOW)
+        return self._pins[gpio]
 
     @property
     def faults(self) -> int:
@@ -183,11 +186,18 @@ class Bench:
         takes = manifest.calibration == "block" and "SCI_RX_GPIO" in self.board
         self.block = read_bytes(code / BLOCK_FILE, "calibration block of the firmware") if takes else b""
         target = compensator.target
-        names = (target.channels if target else ()) or self.device.channels[:5]
+        drive = compensator.current_drive
+        shunts = ("CURRENT", "CURRENT_B")[: drive.loop.shunts if drive else 1]
+        roles = ["COMMAND", *(f"PRESSURE_{name}" for name in compensator.signals.pressures), *shunts, "SUPPLY"]
+        usual = {"COMMAND": "A0", "PRESSURE_A": "A1", "PRESSURE_B": "A2", "PRESSURE_C": "A6"}
+        usual |= {"CURRENT": "A3", "CURRENT_B": "A5", "SUPPLY": "A4"}
+        declared = target.channels if target else ()
+        self.names = dict(zip(roles, declared or [usual[role] for role in roles], strict=False))
         self.crystal_Hz = (target.crystal_Hz if target else None) or self.device.crystal_Hz
-        self.names = dict(zip(("COMMAND", "PRESSURE_A", "PRESSURE_B", "CURRENT", "SUPPLY"), names, strict=False))
         #: Numbers of the declared channels, by what they carry.
         self.channels = {role: self.device.channels.index(name) for role, name in self.names.items()}
+        #: Those of the shunts, that of solenoid A first; of one solenoid, or one shunt, one.
+        self.shunts = [self.channels[role] for role in shunts if drive]
         self.two = len(compensator.signals.signs) == 2
         if board.lacking:
             raise RequirementError(f"dz_board.h has no DZ_BOARD_{board.lacking[0]}, which the firmware needs")

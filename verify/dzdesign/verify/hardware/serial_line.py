@@ -10,8 +10,11 @@ from struct import Struct, pack
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.hardware.model import Bench, Due, Step, Trace
 
-FRAME, FRAME_BEGINS, FRAMES_HZ = Struct(">HBBI9H"), b"\xa5\x5a\x02\x14", 100
-NAMES = ("origin", "command", "pressure A", "pressure B", "beta", "compare value A", "compare value B", "status")
+FRAME, FRAME_BEGINS, FRAMES_HZ = Struct(">HBBI10H"), b"\xa5\x5a\x03\x16", 100
+NAMES = (
+    "origin", "command", "pressure A", "pressure B", "pressure C", "beta", "compare value A", "compare value B",
+    "status",
+)  # fmt: skip
 RELEASED = 0x0080
 #: Nominal bits per second, what a receiver bears, and the bits of an octet.
 BAUD, BAUD_ERROR, OCTET_BITS = 115_200, 0.02, 10
@@ -56,14 +59,16 @@ def line_fault(bench: Bench, trace: Trace, due: list[Due]) -> str:
     frames, at = 0, octets.find(FRAME_BEGINS)
     while 0 <= at <= len(octets) - FRAME.size:
         frame = octets[at : at + FRAME.size]
-        *_, ticks, origin, u, a, b, beta, compare_a, compare_b, status, crc = FRAME.unpack(frame)
+        _, _, _, ticks, *says, crc = FRAME.unpack(frame)
         if crc != _crc(frame[:-2]) or not 0 < ticks <= len(due):
             return f"frame {frames + 1} of the telemetry has a wrong CRC or time"
         known = due[ticks - 1]
-        law = laws[known.side or 1].answer(*known.codes)
-        says = (origin, u, a, b, beta, compare_a, compare_b, status)
+        command, *pressures = known.codes
+        pair = bench.compensator.signals.negative_pair if known.side < 0 else "AB"
+        law = laws[known.side or 1].answer(command, *(pressures["ABC".index(name)] for name in pair))
+        pressures += [0] * (3 - len(pressures))
         state = (known.status | law.status) << 8 | RELEASED * known.released
-        expected = (bench.origin, *known.codes, law.beta, *known.compares, state)
+        expected = (bench.origin, command, *pressures, law.beta, *known.compares, state)
         for name, said, wanted in zip(NAMES, says, expected, strict=True):
             if said != wanted:
                 return f"the telemetry says {name} {said} after {ticks} interrupts, expected {wanted}"

@@ -121,7 +121,7 @@ def _cia408(text: str) -> Mapping[int, FileLaw]:
     if objects != OBJECTS or entries.defaults():
         others = sorted(objects ^ OBJECTS) or sorted(entries.defaults())
         raise ValueError(f"its objects are not those of the dead band: {', '.join(others)[:40]}")
-    dictionary = import_eds(StringIO(text), None)
+    dictionary = import_eds(StringIO(text), None)  # type: ignore[no-untyped-call]
     if any(dictionary[int(record, 16)][0].default != 1 for record in RECORDS):
         raise ValueError("sub-index 0 of a record is not 1, its highest")
     if value("6342") != 1:

@@ -16,12 +16,15 @@ from typing import TypeVar
 import numpy as np
 
 from dzdesign.design.compensator import Compensator
+from dzdesign.verify.exhaustive.exact_law import PRESSURES
 from dzdesign.verify.outputs.exact_block import ExactBlock
 
 #: Inputs by name -> outputs and what is remembered, by name.
 Program = Callable[[Mapping[str, np.ndarray]], Mapping[str, np.ndarray]]
 #: The driven side and whether the command counts as zero, as a call begins.
 State = tuple[np.ndarray, np.ndarray]
+#: Pressures by the names of their inputs.
+Pressures = Mapping[str, np.ndarray]
 Piece = TypeVar("Piece")
 #: Pressures of a PLC, 0.1 bar, whose differences are tried with every command, and those tried at zero command.
 PLC_PRESSURES, PLC_AROUND = (0, 4000), (-300, 4300)
@@ -59,26 +62,26 @@ class _Law:
 
     def __init__(self, exact: ExactBlock) -> None:
         self.exact = exact
-        a, b = exact.sensors
-        high, low = (a.high, b.low) if exact.turn > 0 else (a.low, b.high)
-        largest = exact.turn * ((high - a.zero) * a.weight - (low - b.zero) * b.weight) // exact.unit
+        ahead, behind = exact.sensors
+        largest = int(self.drop(np.array(ahead.high), np.array(behind.low)))
         self.table = exact.table(range(-exact.reverse, largest + 1))
         self.at_zero = np.clip(self.table[:, 0, 2], 0, exact.compare_limit)
 
-    def drop(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    def drop(self, ahead: np.ndarray, behind: np.ndarray) -> np.ndarray:
         """Return the pressure drop of two pressures, rounded down."""
-        first, second = self.exact.sensors
-        weighted = (a - first.zero) * first.weight - (b - second.zero) * second.weight
-        drops: np.ndarray = np.floor_divide(self.exact.turn * weighted, self.exact.unit)
+        (first, second), (of_ahead, of_behind) = self.exact.sensors, self.exact.weights
+        weighted = (ahead - first.zero) * of_ahead - (behind - second.zero) * of_behind
+        drops: np.ndarray = np.floor_divide(weighted, self.exact.unit)
         return drops
 
-    def rows(self, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the rows of the law that two pressures ask for, and what the status says of them."""
-        first, second = self.exact.sensors
-        failed_a, failed_b = (a < first.low) | (a > first.high), (b < second.low) | (b > second.high)
-        drop, sound = self.drop(np.asarray(a, np.int64), np.asarray(b, np.int64)), ~(failed_a | failed_b)
-        below, above = sound & (drop < -self.exact.reverse), sound & (drop > self.exact.tested_to)
-        status = 2 * failed_a + 4 * failed_b + 8 * below + 16 * above
+    def rows(self, pressures: Pressures) -> tuple[np.ndarray, np.ndarray]:
+        """Return the rows of the law that pressures ask for, and what the status says of all of them."""
+        exact, ends = self.exact, self.exact.numbers
+        failed = {name: (each < ends[name].low) | (each > ends[name].high) for name, each in pressures.items()}
+        ahead, behind = (np.asarray(pressures[name], np.int64) for name in exact.pair)
+        drop, sound = self.drop(ahead, behind), ~(failed[exact.pair[0]] | failed[exact.pair[1]])
+        below, above = sound & (drop < -exact.reverse), sound & (drop > exact.tested_to)
+        status = sum((PRESSURES[name] * each for name, each in failed.items()), start=8 * below + 16 * above)
         last = len(self.table) - 1
         return np.where(sound & ~below, np.clip(drop + self.exact.reverse, 0, last), last), status
 
@@ -101,9 +104,8 @@ class _Law:
         for drop in drops:
             for a_from, a_to, b_from, b_to in ((first.low, first.high, second.low, second.high), (low, high) * 2):
                 b = np.arange(b_from, b_to + 1)
-                weighted = (b - second.zero) * second.weight
-                turn, unit = self.exact.turn, self.exact.unit
-                a = first.zero + turn * (drop - np.floor_divide(-turn * weighted, unit))
+                weighted = (b - second.zero) * self.exact.weights[1]
+                a = first.zero + drop - np.floor_divide(-weighted, self.exact.unit)
                 makes = np.flatnonzero((a >= a_from) & (a <= a_to) & (self.drop(a, b) == drop))
                 if makes.size:
                     place = makes[drop * SPREAD % makes.size]
@@ -126,6 +128,9 @@ class EveryPair:
         self.laws = [_Law(ExactBlock(compensator, sign, interface)) for sign in signs]
         self.both, self.remembers, first = len(signs) == 2, remembers, self.laws[0].exact
         self.exact, self.of_codes = first, interface == "codes"
+        #: Inputs, in the order of their names where there are two sides.
+        read = [name for law in self.laws for name in law.exact.pair]
+        self.inputs = sorted(set(read)) if self.both else read
         self.rests = remembers and first.transition_end > 0
         #: What may be remembered: driven side and whether at rest; a new instance's first.
         sides, rests = (0, 1, -1) if self.both else (1,), (1, 0) if self.rests else (1,)
@@ -135,8 +140,8 @@ class EveryPair:
 
     def every_command(self, program: Program, place: int, drops: range | None = None) -> Tried:
         """Try every command of one side at every difference of pressures, or at some."""
-        law, (a, b) = self.laws[place], self.exact.sensors
-        ends = [abs((x - a.zero) * a.weight - (y - b.zero) * b.weight) // self.exact.unit + 1
+        law = self.laws[place]
+        ends = [abs(int(law.drop(np.array(x), np.array(y)))) + 1
                 for x, y in ((self.low, self.high), (self.high, self.low))]  # fmt: skip
         reach = max(ends) if self.of_codes else self.high
         first, second = law.pressures(range(-reach, reach + 1) if drops is None else drops, self.low, self.high)
@@ -144,7 +149,7 @@ class EveryPair:
         return self._swept(program, law, commands, first, second)
 
     def every_pressure(self, program: Program, step: int = 1) -> list[Tried]:
-        """Try every pair of pressures at zero command, and a sample of them at commands of all sizes."""
+        """Try every pair of a side's pressures at zero command, and a sample of them at commands of all sizes."""
         low, high = (self.low, self.high) if self.of_codes else PLC_AROUND
         b, found = np.arange(low, high + 1), []
         for side, rest in self.states:
@@ -152,16 +157,23 @@ class EveryPair:
             rows = max(self.at_once // b.size, 1)
             of_a = np.arange(low, high + 1, stride)
             pieces = [of_a[begin : begin + rows, None] for begin in range(0, of_a.size, rows)]
-            state = (np.array(side), np.array(rest == 1))
-            found.append(self._all(partial(self._at_zero_command, program, b, state), pieces))
+            state, law = (np.array(side), np.array(rest == 1)), self.laws[-1 if side < 0 else 0]
+            found.append(self._all(partial(self._at_zero_command, program, law, b, state), pieces))
         random = np.random.default_rng(SEED)
         commands = np.arange(self.exact.commands[0], self.exact.commands[1] + 1, STRIDE)
         sample = random.integers(low, high + 1, (2, SAMPLE))
-        at_zero = replace(reduce(Tried.and_then, found), pairs=found[0].pairs)
+        spaces = len({frozenset(law.exact.pair) for law in self.laws})
+        at_zero = replace(reduce(Tried.and_then, found), pairs=spaces * found[0].pairs)
         return [at_zero, *(self._swept(program, law, commands, *sample) for law in self.laws)]
 
-    def _at_zero_command(self, program: Program, b: np.ndarray, state: State, a: np.ndarray) -> Tried:
-        return self._judged(program, np.array(self.exact.command_zero), a, b, state)
+    def _at_zero_command(self, program: Program, law: _Law, b: np.ndarray, state: State, a: np.ndarray) -> Tried:
+        return self._judged(program, np.array(self.exact.command_zero), self.with_other(law, a, b), state)
+
+    def with_other(self, law: _Law, ahead: np.ndarray, behind: np.ndarray) -> Pressures:
+        """Return a side's pressures, and beside them any of the input that it does not read, if there is one."""
+        known = dict(zip(law.exact.pair, (ahead, behind), strict=True))
+        any_of = self.low + (SPREAD * behind + 257 * ahead) % (self.high - self.low + 1)
+        return {name: known.get(name, any_of) for name in self.inputs}
 
     def extremes(self, program: Program) -> Tried:
         """Try the ends of what is valid and of the inputs' type, in all combinations and from every state."""
@@ -171,18 +183,19 @@ class EveryPair:
         commands = [first.command_zero, *(each for each in (*ends, low - 1, high + 1) if not low <= each <= high)]
         pressures = [
             [*ends, 0, *(end + off for end in (sensor.low, sensor.high) for off in (-1, 0, 1))]
-            for sensor in first.sensors
+            for sensor in (first.numbers[name] for name in self.inputs)
         ]
-        grid = np.array(np.meshgrid(commands, *pressures)).reshape(3, -1)
+        grid = np.array(np.meshgrid(commands, *pressures)).reshape(1 + len(pressures), -1)
         grid = grid[:, (grid >= ends[0]).all(axis=0)]
-        each = [self._judged(program, grid[0], grid[1], grid[2], (np.array(side), np.array(rest == 1)))
+        given = dict(zip(self.inputs, grid[1:], strict=True))
+        each = [self._judged(program, grid[0], given, (np.array(side), np.array(rest == 1)))
                 for side, rest in self.states]  # fmt: skip
         return reduce(Tried.and_then, each)
 
     def at_zero(self, program: Program, place: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Return the outputs at zero command with one side driven."""
-        sign = self.laws[place].exact.sign
-        found = program(self._given(np.array(self.exact.command_zero), a, b, (np.array(sign), np.array(True))))
+        sign, given = self.laws[place].exact.sign, self.with_other(self.laws[place], a, b)
+        found = program(self._given(np.array(self.exact.command_zero), given, (np.array(sign), np.array(True))))
         return np.broadcast_to(found["output_b" if self.both and sign < 0 else "output_a"], a.shape)
 
     def _swept(self, program: Program, law: _Law, commands: np.ndarray, a: np.ndarray, b: np.ndarray) -> Tried:
@@ -197,13 +210,13 @@ class EveryPair:
         pieces = [slice(begin, begin + PIECE) for begin in range(0, a.size, PIECE)]
 
         def tried(piece: slice) -> Tried:
-            first, second, found = a[piece], b[piece], Tried()
-            known = law.outputs(law.rows(first, second)[0])
-            rows = max(self.at_once // first.size, 1)
+            given, found = self.with_other(law, a[piece], b[piece]), Tried()
+            known = law.outputs(law.rows(given)[0])
+            rows = max(self.at_once // a[piece].size, 1)
             for begin in range(0, command.size, rows):
                 some = slice(begin, begin + rows)
                 state = (states[some, :1], states[some, 1:] == 1)
-                found = found.and_then(self._judged(program, command[some, None], first, second, state, (law, known)))
+                found = found.and_then(self._judged(program, command[some, None], given, state, (law, known)))
             return found
 
         return replace(self._all(tried, pieces), pairs=commands.size * a.size)
@@ -215,26 +228,30 @@ class EveryPair:
             found = list(pool.map(work, pieces))
         return reduce(Tried.and_then, found)
 
-    def _given(self, command: np.ndarray, a: np.ndarray, b: np.ndarray, state: State) -> dict[str, np.ndarray]:
-        given = {"command": command, "pressure_a": a, "pressure_b": b} | ({"side": state[0]} if self.both else {})
+    def _given(self, command: np.ndarray, pressures: Pressures, state: State) -> dict[str, np.ndarray]:
+        given = {"command": command, **{f"pressure_{name.lower()}": each for name, each in pressures.items()}}
+        given |= {"side": state[0]} if self.both else {}
         given = {name: each.astype(np.int64) for name, each in given.items()}
         return given | ({"at_rest": state[1]} if self.rests else {})
 
     def _judged(
-        self, program: Program, command: np.ndarray, a: np.ndarray, b: np.ndarray, state: State, known: Known = None
+        self, program: Program, command: np.ndarray, pressures: Pressures, state: State, known: Known = None
     ) -> Tried:
         """Give a program some inputs, and compare all that it gives."""
-        found, expected = program(self._given(command, a, b, state)), self._expected(command, a, b, state, known)
-        shape = np.broadcast_shapes(command.shape, a.shape, b.shape)
+        found, expected = (
+            program(self._given(command, pressures, state)),
+            self._expected(command, pressures, state, known),
+        )
+        shape = np.broadcast_shapes(command.shape, *(each.shape for each in pressures.values()))
         names = ["output_a", "output_b"][: len(self.laws)]
         differs = {name: np.broadcast_to(found[name] != expected[name], shape) for name in expected if name in found}
         wrong, first = np.logical_or.reduce([differs[name] for name in names]), ""
         if wrong.any():
             at = np.unravel_index(int(wrong.argmax()), shape)
             name = next(name for name in names if differs[name][at])
-            all_of = (command, a, b, found[name], expected[name])
-            told = [int(np.broadcast_to(each, shape)[at]) for each in all_of]
-            first = "command {}, pressures {} and {}: {}, expected {}".format(*told)
+            all_of = (command, found[name], expected[name], *pressures.values())
+            asked, gave, must, *told = [int(np.broadcast_to(each, shape)[at]) for each in all_of]
+            first = f"command {asked}, pressures {' and '.join(map(str, told))}: {gave}, expected {must}"
         digest = blake2b(digest_size=8)
         for name in names:
             digest.update(np.ascontiguousarray(np.broadcast_to(found[name], shape), dtype="<i4").tobytes())
@@ -249,9 +266,7 @@ class EveryPair:
             outputs_hash=digest.hexdigest(),
         )
 
-    def _expected(
-        self, command: np.ndarray, a: np.ndarray, b: np.ndarray, state: State, known: Known
-    ) -> dict[str, np.ndarray]:
+    def _expected(self, command: np.ndarray, pressures: Pressures, state: State, known: Known) -> dict[str, np.ndarray]:
         """Return what a program must give; without `known` only zero command can be asked for."""
         side, rest = state
         first, last = self.laws[0].exact, self.laws[-1].exact
@@ -270,7 +285,7 @@ class EveryPair:
         driven = sound & (side != 0)
         outputs, statuses, betas = [], [], []
         for law in self.laws:
-            rows, status = law.rows(a, b)
+            rows, status = law.rows(pressures)
             if known is not None and known[0] is law:
                 value = known[1][towards[:, 0]]
             else:

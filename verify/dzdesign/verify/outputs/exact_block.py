@@ -27,12 +27,11 @@ PARTS, NUMBERS = 3, 7
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sensor:
-    """Numbers of a pressure input: valid from and to, at no pressure, and what one counts in a difference."""
+    """Numbers of a pressure input: valid from and to, and at no pressure."""
 
     low: int
     high: int
     zero: int
-    weight: int
 
 
 class ExactBlock(ExactLaw):
@@ -45,11 +44,13 @@ class ExactBlock(ExactLaw):
         self.leave_zero, self.unit = functions.leave_zero_codes, 4096
         self.rounding, self.command_zero = HALF, command.zero_code
         self.commands = command.valid_codes
-        self.sensors = (
-            Sensor(low=self.a.valid_codes[0], high=self.a.valid_codes[1], zero=self.a.zero_code, weight=4096),
-            Sensor(low=self.b.valid_codes[0], high=self.b.valid_codes[1], zero=self.b.zero_code, weight=self._weight),
-        )
-        self.largest = compensator.signals.largest_difference(sign)
+        #: Of every pressure input by name, and what a number ahead and one behind count in a difference.
+        self.numbers = {
+            name: Sensor(low=each.valid_codes[0], high=each.valid_codes[1], zero=each.zero_code)
+            for name, each in compensator.signals.pressures.items()
+        }
+        self.weights = (4096, self._weight)
+        self.largest = compensator.signals.pair(sign).largest_difference
         if not self.of_codes:
             self._take_units()
 
@@ -67,21 +68,29 @@ class ExactBlock(ExactLaw):
         self.leave_zero = widened(self.leave_zero)
         self.compare_limit = floor(Fraction(self.compare_limit, self.compare_max) * PER_WHOLE)
         self.compare_max = PER_WHOLE
-        noise = floor(self.reverse * self.a.per_code_MPa * PER_MPa)
+        signals = self.compensator.signals
+        finest_MPa = min(signals.pair(sign).ahead.per_code_MPa for sign in signals.signs)
+        noise = floor(self.reverse * finest_MPa * PER_MPa)
         last = self.compensator.side(self.sign).certificate.dp_MPa[1]
         self.tested_to = floor(last * PER_MPa)
-        self.sensors = tuple(  # type: ignore[assignment]
-            Sensor(
+        self.numbers = {
+            name: Sensor(
                 low=ceil((low - each.zero_code) * each.per_code_MPa * PER_MPa) if low else -noise,
                 high=floor((high - each.zero_code) * each.per_code_MPa * PER_MPa),
                 zero=0,
-                weight=1,
             )
-            for each in (self.a, self.b)
+            for name, each in signals.pressures.items()
             for low, high in [each.valid_codes]
-        )
-        self.codes_per_unit = 1 / (self.a.per_code_MPa * PER_MPa)
+        }
+        self.weights = (1, 1)
+        self.codes_per_unit = 1 / (self.ahead.per_code_MPa * PER_MPa)
         self.reverse_codes, self.reverse = self.reverse, noise
+
+    @property
+    def sensors(self) -> tuple[Sensor, Sensor]:
+        """The inputs ahead and behind."""
+        ahead, behind = self.pair
+        return self.numbers[ahead], self.numbers[behind]
 
     def betas_at(self, drop: int) -> Betas:
         """Return both betas at a pressure drop in units of the inputs."""

@@ -30,14 +30,13 @@ from dzdesign.verify.requirements import Check
 from dzdesign.verify.toolchain.compiled_core import ENDINGS
 
 Say = Callable[[str], None]
-Codes = tuple[int, int, int]
+Codes = tuple[int, ...]
 INSTALL = 'FMPy, which runs FMUs, is not installed; run `pip install "fmpy>=0.3.20,<0.4"`'
 COMPENSATOR, PLANT = "dz_compensator", "dz_plant"
 #: Of the drive: samples and their seed; of V and MPa: rows.
 DRIVE_SAMPLES, SEED, PHYSICAL_ROWS = 3000, 25, 4000
 #: Of a code, as near its border as this the rounding of a double decides.
 AT_BORDER = Fraction(1, 10**6)
-CODES, VALUES = ("u_i_code", "p_A_code", "p_B_code"), ("u_i", "p_A", "p_B")
 #: Of the closed loop: share of the largest flow that is allowed, and the command over time: rest, up, full, down, rest,
 #: then steps; s and shares of full command.
 TOLERANCE = 1e-4
@@ -120,6 +119,15 @@ def unpacked(path: Path, place: Path) -> Unpacked:
     return Unpacked(name=path.name, folder=folder, binary=binary, problems=problems)
 
 
+def _values(compensator: Compensator) -> tuple[str, ...]:
+    """Return the names of the inputs in V and MPa."""
+    return ("u_i", *(f"p_{name}" for name in compensator.signals.pressures))
+
+
+def _code_inputs(compensator: Compensator) -> tuple[str, ...]:
+    return tuple(f"{name}_code" for name in _values(compensator))
+
+
 def _check(requirement: requirements.Requirement, faults: Iterator[str], text: str) -> Check:
     try:
         found = list(faults)
@@ -137,12 +145,14 @@ def _law_faults(
     outputs = [f"{name}{ENDINGS[sign]}" for sign in signals.signs for name in ("compare", "status", "beta", "u_O")]
     must = []
     for exact in (ExactLaw(compensator, sign) for sign in signals.signs):
-        answers = np.array([exact.answer(*each) for each in codes], dtype=float)
+        read = [0, *(1 + list(signals.pressures).index(name) for name in exact.pair)]
+        answers = np.array([exact.answer(*(each[place] for place in read)) for each in codes], dtype=float)
         must += [*(answers / (1, 1, BETA_UNIT)).T, answers[:, 0] * full / signals.compare_max]
     for exchange in (False, True):
         found = np.array(run_in_child(
-            "stepped", f"the law of {fmu.name}", folder=str(fmu.folder), names=names, rows=rows, codes=names == CODES,
-            outputs=outputs, step_s=1 / signals.tick_Hz, exchange=exchange,
+            "stepped", f"the law of {fmu.name}", folder=str(fmu.folder), names=names, rows=rows,
+            codes=names[0].endswith("_code"), outputs=outputs, step_s=1 / signals.tick_Hz,
+            exchange=exchange,
         ))[:, : len(outputs)]  # fmt: skip
         wrong = ~np.isclose(found, np.array(must).T, rtol=1e-9, atol=1e-9).all(axis=1)
         for index in np.flatnonzero(wrong):
@@ -152,11 +162,20 @@ def _law_faults(
 
 def law_check(fmu: Unpacked, compensator: Compensator) -> Check:
     """Compare law, status and beta of the binary with the exact law, at a sample of the codes and their ends."""
-    laws = (ExactLaw(compensator, sign) for sign in compensator.signals.signs)
-    codes = [each for exact in laws for each in PreparedInputs(exact).sampled_codes()]
+    codes = [codes for sign in compensator.signals.signs for codes in _sampled_codes(compensator, sign)]
     text = f"{len(codes)} inputs in codes, at the ends of all that is valid and between them: 0 differ"
     rows = [list(map(float, each)) for each in codes]
-    return _check(requirements.FMU_LAW, _law_faults(fmu, compensator, CODES, rows, codes), text)
+    return _check(requirements.FMU_LAW, _law_faults(fmu, compensator, _code_inputs(compensator), rows, codes), text)
+
+
+def _sampled_codes(compensator: Compensator, sign: int) -> list[Codes]:
+    """Return codes of all inputs, those of one side's law and any of the pressure that it does not read."""
+    exact, names = ExactLaw(compensator, sign), compensator.signals.pressures
+    found: list[Codes] = []
+    for command, ahead, behind in PreparedInputs(exact).sampled_codes():
+        known = dict(zip(exact.pair, (ahead, behind), strict=True))
+        found.append((command, *(known.get(name, (command + ahead) % (exact.code_max + 1)) for name in names)))
+    return found
 
 
 def drive_check(fmu: Unpacked, compensator: Compensator) -> Check:
@@ -181,8 +200,9 @@ def _drive_faults(fmu: Unpacked, compensator: Compensator) -> Iterator[str]:
     rows = [list(map(float, sample)) for sample in samples for _ in range(held)]
     for exchange in (False, True):
         found = run_in_child(
-            "stepped", f"the drive of {fmu.name}", folder=str(fmu.folder), names=CODES, rows=rows, codes=True,
-            outputs=("compare_a", "compare_b", "drive_status"), step_s=1 / signals.tick_Hz, exchange=exchange,
+            "stepped", f"the drive of {fmu.name}", folder=str(fmu.folder), rows=rows, codes=True,
+            names=_code_inputs(compensator), outputs=("compare_a", "compare_b", "drive_status"),
+            step_s=1 / signals.tick_Hz, exchange=exchange,
         )  # fmt: skip
         kind = "Model Exchange" if exchange else "Co-Simulation"
         for period, (values, must) in enumerate(zip(found, expected, strict=True)):
@@ -200,20 +220,22 @@ def physical_check(fmu: Unpacked, compensator: Compensator) -> Check:
 
 def _physical_faults(fmu: Unpacked, compensator: Compensator) -> Iterator[str]:
     signals, rng, u_max = compensator.signals, np.random.default_rng(SEED), float(compensator.u_max_V)
-    spans = [float(sensor.span_MPa) for sensor in (signals.pressure_a, signals.pressure_b)]
-    low = -u_max if len(signals.signs) == 2 else 0.0
-    rows = rng.uniform([low, 0.0, 0.0], [u_max, *spans], (PHYSICAL_ROWS, 3))
+    spans = [float(sensor.span_MPa) for sensor in signals.pressures.values()]
+    low = [-u_max if len(signals.signs) == 2 else 0.0, *(0.0 for _ in spans)]
+    rows = rng.uniform(low, [u_max, *spans], (PHYSICAL_ROWS, len(low)))
     rows[::7, 1] = rows[::7, 2] + rng.uniform(0, spans[0] / 4, rows[::7].shape[0])  # pressure drops as tested
     rows[::7, 1] = np.minimum(rows[::7, 1], spans[0])
     rows[:5, 0] = 0.0
     known = [(row, codes) for row in rows.tolist() if (codes := _codes(compensator, row))]
-    yield from _law_faults(fmu, compensator, VALUES, [row for row, _ in known], [codes for _, codes in known])
+    yield from _law_faults(
+        fmu, compensator, _values(compensator), [row for row, _ in known], [codes for _, codes in known]
+    )
     if len(known) < PHYSICAL_ROWS // 2:
         yield f"{len(known)} of {PHYSICAL_ROWS} inputs have codes that rounding does not decide; expected half of them"
 
 
 def _codes(compensator: Compensator, row: Row) -> Codes | None:
-    """Return the codes that an ideal converter makes of V, MPa and MPa; None at a border.
+    """Return the codes that an ideal converter makes of V and MPa; None at a border.
 
     A span of n codes has n + 1 of them, of one width.
     """
@@ -221,12 +243,11 @@ def _codes(compensator: Compensator, row: Row) -> Codes | None:
     command, sign = signals.command, -1 if row[0] < 0 else 1
     share = abs(Fraction(row[0])) / compensator.u_max_V
     exact = [command.zero_code + command.direction(sign) * share * (command.span(sign) + 1)]
-    for value, sensor in zip(row[1:], (signals.pressure_a, signals.pressure_b), strict=True):
+    for value, sensor in zip(row[1:], signals.pressures.values(), strict=True):
         exact.append(sensor.zero_code + Fraction(value) / sensor.span_MPa * (sensor.full_code - sensor.zero_code + 1))
     if any(abs(each - round(each)) < AT_BORDER and each != round(each) for each in exact):
         return None
-    command_code, p_a, p_b = (min(max(floor(each), 0), signals.code_max) for each in exact)
-    return command_code, p_a, p_b
+    return tuple(min(max(floor(each), 0), signals.code_max) for each in exact)
 
 
 def closed_loop_check(
@@ -249,7 +270,7 @@ def closed_loop_check(
                     plant=str(plant_fmu.folder), drop_MPa=drop_MPa, back_MPa=back_MPa, step_s=1 / signals.tick_Hz,
                     command_V=(sign * share * float(compensator.u_max_V)).tolist(),
                     drive="compare_b" if sign < 0 else "compare_a",
-                    pressures=("p_B", "p_A") if loop.channels.swapped else ("p_A", "p_B"),
+                    pressures=[f"p_{name}" for name in signals.pair(sign).names],
                 ))  # fmt: skip
                 if (largest := float(run.q_L_min.max())) <= 0:
                     raise RequirementError(f"the same plant lets no flow pass at {drop_MPa:g} MPa")

@@ -58,7 +58,7 @@ MISSING = "GNU Octave not found; install it (Debian: apt install octave) to have
 #: A block of inputs that takes longer hangs, s; so many characters of what Octave says are told; and so many inputs are
 #: given to it at once, as it starts anew for each.
 TIMEOUT_S, LONGEST, STARTED_ANEW = 120.0, 300, 1 << 20
-INPUTS, OUTPUTS = ("command", "pressure_a", "pressure_b"), ("output_a", "status", "beta")
+OUTPUTS = ("output_a", "status", "beta")
 
 
 def block_checks(folder: Path, manifest: OutputManifest, compensator: Compensator, say: Say) -> OutputChecks:
@@ -203,12 +203,12 @@ def zero_margin(program: Program, every: EveryPair, place: int) -> ZeroCommandMa
     if exact.of_codes:
         found = differences(exact)
         drops, b = pressure_drops(exact, found, tested), np.minimum(found.b_first, exact.code_max)
-        a = exact.turn * found.values + found.slant[b]
+        a = found.values + found.slant[b]
     else:
-        ahead, behind = exact.sensors if exact.turn > 0 else exact.sensors[::-1]
+        ahead, behind = exact.sensors
         values = np.arange(ahead.low - behind.high, ahead.high - behind.low + 1)
-        second = np.maximum(behind.low, ahead.low - values)
-        a, b = (values + second, second)[:: exact.turn]
+        b = np.maximum(behind.low, ahead.low - values)
+        a = values + b
         drops = _drops(exact, values, tested)
     outputs = every.at_zero(program, place, a, b)
     (margin,) = margins_of_drives(drops, outputs, exact.compensator.u_max_V / exact.compare_max, [bounds])
@@ -217,8 +217,8 @@ def zero_margin(program: Program, every: EveryPair, place: int) -> ZeroCommandMa
 
 def _drops(exact: ExactBlock, values: np.ndarray, tested: set[Fraction]) -> PressureDrops:
     """Return the least and the largest pressure drop that each number of a PLC may stand for."""
-    (a_least, a_most), (b_least, b_most) = exact.a.error_MPa, exact.b.error_MPa
-    ends = sorted(exact.turn * error for error in (a_least - b_most, a_most - b_least))
+    (a_least, a_most), (b_least, b_most) = exact.ahead.error_MPa, exact.behind.error_MPa
+    ends = (a_least - b_most, a_most - b_least)
     scale = lcm(PER_MPa, *(value.denominator for value in (*ends, *tested)))
     least = (values - 1).astype(object) * (scale // PER_MPa) + int(ends[0] * scale)
     most = (values + 1).astype(object) * (scale // PER_MPa) + int(ends[1] * scale)
@@ -267,7 +267,7 @@ def running(path: str, name: str, text: bytes) -> Iterator[Program]:
         numbers = count()
 
         def run(given: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-            codes, job = np.broadcast_arrays(*(given[name] for name in INPUTS)), next(numbers)
+            codes, job = np.broadcast_arrays(*given.values()), next(numbers)
             asked, answers = place / f"{job}.in", place / f"{job}.out"
             asked.write_bytes(b"".join(np.ascontiguousarray(each, dtype="<u2").tobytes() for each in codes))
             command = [path, *FLAGS, PROGRAM.name, name, asked.name, answers.name]

@@ -37,10 +37,10 @@ SAMPLE = Function("dz_check_sample", ("in", "out"))
 PARTS, TURNS = 8, 6
 SCALARS = (
     "parts", "codes", "first_code", "code_step", "sound_from", "sound_to", "zero_place", "zero_code", "compare_limit",
-    "a_low", "a_high", "b_low", "b_high", "turn", "reverse", "lowest", "safe_law", "safe_at_zero", "rows", "pairs",
+    "a_low", "a_high", "b_low", "b_high", "reverse", "lowest", "safe_law", "safe_at_zero", "rows", "pairs",
     "places", "stride", "cube", "impatient", "laws_at", "rows_at", "directions_at", "slant_at", "pairs_at",
     "places_at", "betas_at", "tested_to", "dither_counts", "dither_ticks", "both", "leave_zero", "ramp_unit",
-    "failed_status",
+    "failed_status", "ahead_input", "behind_input", "other_input", "ahead_bit", "behind_bit", "other_bit",
 )  # fmt: skip
 PLAN = np.dtype([("denominator", "<i8", PARTS), ("part_end", "<i4", PARTS), *((name, "<i4") for name in SCALARS)])
 PART = np.dtype([("remainder", "<i8"), ("carry", "<i8"), ("quotient", "<i4"), ("step", "<i4")])

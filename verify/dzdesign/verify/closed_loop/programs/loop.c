@@ -66,7 +66,9 @@ struct task
     int32_t every;
     int32_t amplifier; /* 0: the command goes to the PWM as it is */
     int32_t negative;  /* drive solenoid B */
-    int32_t swapped;   /* sensors A and B the other way round */
+    int32_t ahead;     /* which input the pressure ahead is, 0 for A, and the one behind; the code of any other */
+    int32_t behind;
+    int32_t other_code;
     int32_t wave;      /* without the amplifier: half the height of a square wave about the command, counts; 0: none */
     int32_t wave_ticks; /* and the periods of half of it */
     int32_t mean;      /* the plant has the drive's dither in it already: it takes the law without it */
@@ -74,9 +76,9 @@ struct task
     const double *supply_MPa; /* pressure drop at no flow */
     const double *back_MPa;   /* pressure behind the edge */
     const double *bias_V;     /* drive that is added to the plant's, of another valve or a current's error */
-    const int32_t *shown;     /* codes of sensors A and B; below zero: of the plant's own pressures */
+    const int32_t *shown;     /* codes ahead and behind; below zero: of the plant's own pressures */
     uint32_t seed;            /* of the noise, not zero */
-    struct channel channels[3]; /* command, pressures A and B */
+    struct channel channels[3]; /* command, pressures ahead and behind */
     const struct coil *coil;    /* what the law's output is the set point of the current in; null: it is the duty */
     const struct sensor *sensor; /* of that current */
 };
@@ -93,7 +95,7 @@ static int32_t waved(const struct task *task, int32_t direct, int32_t place, int
     return (compare < 0) ? 0 : ((compare > counts) ? counts : compare);
 }
 
-/* The codes of sensors A and B. */
+/* The codes of the sensors ahead and behind. */
 static void read_pressures(const struct task *task, const struct plant *plant, int32_t k, uint32_t *seed, uint16_t *codes)
 {
     const double back_MPa = task->back_MPa[k];
@@ -101,10 +103,25 @@ static void read_pressures(const struct task *task, const struct plant *plant, i
 
     for (int32_t sensor = 0; sensor < 2; sensor++) {
         const int32_t shown = task->shown[2 * k + sensor];
-        const double own_MPa = (sensor == task->swapped) ? ahead_MPa : back_MPa;
+        const double own_MPa = (sensor == 0) ? ahead_MPa : back_MPa;
 
         codes[sensor] = (shown < 0) ? convert(&task->channels[1 + sensor], own_MPa, seed) : (uint16_t)shown;
     }
+}
+
+/* A new sample, each pressure at its input. */
+static void sample(const struct task *task, struct dz_drive *drive, uint16_t u_code, const uint16_t *pressures)
+{
+    const uint16_t other = (uint16_t)task->other_code;
+    uint16_t codes[3] = {other, other, other};
+
+    codes[task->ahead] = pressures[0];
+    codes[task->behind] = pressures[1];
+#ifdef DZ_STATUS_PRESSURE_C
+    dz_drive_sample(drive, u_code, codes[0], codes[1], codes[2]);
+#else
+    dz_drive_sample(drive, u_code, codes[0], codes[1]);
+#endif
 }
 
 static inline void run(const struct task *task, struct plant *plant, double *record)
@@ -135,7 +152,7 @@ static inline void run(const struct task *task, struct plant *plant, double *rec
                     const uint16_t u_code = convert(&task->channels[0], task->command[k], &seed);
 
                     read_pressures(task, plant, k, &seed, pressures);
-                    dz_drive_sample(&drive, u_code, pressures[0], pressures[1]);
+                    sample(task, &drive, u_code, pressures);
                     tick = (int32_t)DZ_DRIVE_TICKS_PER_SAMPLE;
                 }
                 tick--;
@@ -148,7 +165,10 @@ static inline void run(const struct task *task, struct plant *plant, double *rec
                 compare = (uint16_t)waved(task, direct, k * task->every + j, plant->counts);
             }
             if (task->coil != NULL) {
-                plant_period_of_current(plant, coil_period(&coil, compare) / task->coil->rated_A);
+                const uint16_t set_points[2] = {task->negative ? 0u : compare, task->negative ? compare : 0u};
+
+                coil_period(&coil, set_points);
+                plant_period_of_current(plant, coil.means_A[task->negative] / task->coil->rated_A);
             } else {
                 plant_period(plant, (in_force < plant->counts) ? in_force : plant->counts);
             }
@@ -167,12 +187,12 @@ static inline void run(const struct task *task, struct plant *plant, double *rec
     }
 }
 
-/* choices: n, every, amplifier, negative, swapped, wave, its ticks, mean, largest code, largest compare value, seed.
+/* choices: n, every, amplifier, negative, input ahead, behind, code of another, wave, its ticks, mean, largest code, largest compare value, seed.
  * series, channels: see `task`; errors: three numbers a channel, see `channel_of`.
  * p: the plant, see plant.py; curve: its recorded characteristic, see stand_in.py, or null; coil, sensor:
  * of a drive by current, or null.
  * record[n][9]: compare value, dP in MPa, Q in L/min at its end; over the record mean and largest Q; position in m; the
- * last codes of sensors A and B; mean current of the last period in V of command. */
+ * last codes ahead and behind; mean current of the last period in V of command. */
 void dz_loop(const int32_t *choices, const double *command, const double *supply_MPa, const double *back_MPa,
              const double *bias_V, const int32_t *shown, const int32_t *zeros, const int32_t *fulls,
              const double *spans, const double *errors, const double *p, const double *curve, const struct coil *coil,
@@ -180,13 +200,13 @@ void dz_loop(const int32_t *choices, const double *command, const double *supply
 {
     struct plant plant;
     struct task task = {choices[0], choices[1], choices[2], choices[3], choices[4], choices[5],
-                        choices[6], choices[7], command,    supply_MPa, back_MPa,   bias_V,
-                        shown,      (uint32_t)choices[10],  {{0.0, 0.0, 0.0, 0.0, 0.0, 0.0}}, coil, sensor};
+                        choices[6], choices[7], choices[8], choices[9], command,    supply_MPa, back_MPa, bias_V,
+                        shown,      (uint32_t)choices[12],  {{0.0, 0.0, 0.0, 0.0, 0.0, 0.0}}, coil, sensor};
 
     for (int index = 0; index < 3; index++) {
-        task.channels[index] = channel_of(zeros[index], fulls[index], spans[index], choices[8], &errors[3 * index]);
+        task.channels[index] = channel_of(zeros[index], fulls[index], spans[index], choices[10], &errors[3 * index]);
     }
-    plant_at_rest(&plant, p, curve, choices[9], supply_MPa[0]);
+    plant_at_rest(&plant, p, curve, choices[11], supply_MPa[0]);
     run(&task, &plant, record);
 }
 

@@ -13,9 +13,12 @@ void coil_loop(const struct coil *coils, const uint32_t *changes, uint32_t coil_
             coil_becomes(&run, &coils[next]);
             next++;
         }
-        traces[k].compare = run.loop.compare;
-        traces[k].mean_A = coil_period(&run, set_points[k]);
+        traces[k].compare = (uint16_t)run.loop.compare;
+        coil_period(&run, &set_points[2u * k]);
+        traces[k].means_A[0] = run.means_A[0];
+        traces[k].means_A[1] = run.means_A[1];
+        traces[k].both_A = run.both_A;
         traces[k].sum = run.sum;
-        traces[k].faults = run.loop.faults;
+        traces[k].faults = (uint16_t)run.loop.faults;
     }
 }

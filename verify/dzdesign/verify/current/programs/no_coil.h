@@ -17,20 +17,20 @@ struct sensor
 
 struct coil_run
 {
-    const struct coil *coil;
+    double means_A[2];
 };
 
 static inline void coil_at_rest(struct coil_run *run, const struct coil *coil, const struct sensor *sensor)
 {
+    (void)run;
+    (void)coil;
     (void)sensor;
-    run->coil = coil;
 }
 
-static inline double coil_period(struct coil_run *run, uint16_t set_point)
+static inline void coil_period(struct coil_run *run, const uint16_t *set_points)
 {
     (void)run;
-    (void)set_point;
-    return 0.0;
+    (void)set_points;
 }
 
 #endif

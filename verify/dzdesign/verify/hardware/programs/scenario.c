@@ -8,8 +8,11 @@
  * converter ON CHANNEL  whether its starts are heard          interrupts ON 0     whether the processor takes them
  * halt 0 0              by a debugger                         clock 0 0           stands still
  * octet VALUE GPIO      comes on a serial line
- * compare A B           written after each interrupt           coil CHANNEL GPIO   a solenoid and its sensor, with
- * sensor CODES_PER_A ZERO_CODE, winding OHM HENRY, supply V DIODE_V and flows A 0 (at the start)
+ * compare A B           written after each interrupt           coil CHANNEL GPIO   a solenoid and its sensor; of two
+ * solenoids one each, perhaps with one sensor; all with sensor CODES_PER_A ZERO_CODE, winding OHM HENRY and supply V
+ * DIODE_V; flows A 0     a current in the first one (at the start)
+ *
+ * Where the pin of a solenoid goes high, what flows in the other one is printed: held GPIO and 0.1 mA.
  *
  * Each function of main.c that is entered is a turn of the main loop: it takes TURN_S. */
 #include <setjmp.h>
@@ -41,8 +44,8 @@ static unsigned step_count, step_at;
 static double started_s, end_s;
 static bool started, writes, interrupts_off, hangs, deaf[CHANNELS];
 static uint16_t codes[CHANNELS], compares[2];
-static unsigned coil_channel = CHANNELS, coil_gpio = GPIOS;
-static struct solenoid solenoid;
+static unsigned coils, coil_channel[2], coil_gpio[2];
+static struct solenoid solenoids[2];
 static jmp_buf out;
 
 /* What the firmware says is wrong, when that changes. */
@@ -59,10 +62,17 @@ static void tell_faults(void)
 
 void happened(const char *what, unsigned one, unsigned two)
 {
-    if ((strcmp(what, "pin") == 0) && (one == coil_gpio))
+    for (unsigned coil = 0u; (strcmp(what, "pin") == 0) && (coil < coils); coil++)
     {
-        solenoid_go_to(&solenoid, seconds_now());
-        solenoid.on = two == HIGH;
+        solenoid_go_to(&solenoids[coil], seconds_now());
+        if (one == coil_gpio[coil])
+        {
+            solenoids[coil].on = two == HIGH;
+        }
+        else if (two == HIGH)
+        {
+            printf("%lld held %u %u\n", (long long)now, coil_gpio[coil], (unsigned)(1e4 * solenoids[coil].current));
+        }
     }
     if (strcmp(what, "start") == 0)
     {
@@ -78,12 +88,20 @@ void happened(const char *what, unsigned one, unsigned two)
 
 uint16_t code_at(unsigned channel)
 {
-    if (channel != coil_channel)
+    struct solenoid sensed = solenoids[0];
+    bool is_sensor = false;
+
+    sensed.current = 0.0;
+    for (unsigned coil = 0u; coil < coils; coil++)
     {
-        return codes[channel];
+        solenoid_go_to(&solenoids[coil], seconds_now());
+        if (channel == coil_channel[coil])
+        {
+            sensed.current += solenoids[coil].current;
+            is_sensor = true;
+        }
     }
-    solenoid_go_to(&solenoid, seconds_now());
-    return solenoid_code(&solenoid);
+    return is_sensor ? solenoid_code(&sensed) : codes[channel];
 }
 
 bool converter_hears(unsigned channel) { return !deaf[channel]; }
@@ -153,27 +171,28 @@ void act(void)
     }
     else if (strcmp(step->word, "coil") == 0)
     {
-        coil_channel = one;
-        coil_gpio = two;
+        coil_channel[coils] = one;
+        coil_gpio[coils] = two;
+        coils++;
     }
     else if (strcmp(step->word, "sensor") == 0)
     {
-        solenoid.codes_per_A = step->one;
-        solenoid.zero_code = step->two;
+        solenoids[0].codes_per_A = step->one;
+        solenoids[0].zero_code = step->two;
     }
     else if (strcmp(step->word, "winding") == 0)
     {
-        solenoid.ohm = step->one;
-        solenoid.henry = step->two;
+        solenoids[0].ohm = solenoids[1].ohm = step->one;
+        solenoids[0].henry = solenoids[1].henry = step->two;
     }
     else if (strcmp(step->word, "supply") == 0)
     {
-        solenoid.supply_V = step->one;
-        solenoid.diode_V = step->two;
+        solenoids[0].supply_V = solenoids[1].supply_V = step->one;
+        solenoids[0].diode_V = solenoids[1].diode_V = step->two;
     }
     else
     {
-        solenoid.current = step->one;
+        solenoids[0].current = step->one;
     }
 }
 

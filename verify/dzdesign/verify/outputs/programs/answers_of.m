@@ -1,5 +1,5 @@
-% Answers of a function to codes: octave answers_of.m FUNCTION CODES ANSWERS. The first file has all commands, all pressures A
-% and all pressures B, in 16 bits each; the second gets compare, status and beta alike.
+% Answers of a function to codes: octave answers_of.m FUNCTION CODES ANSWERS. The first file has all commands, all pressures
+% ahead and all behind, in 16 bits each; the second gets compare, status and beta alike.
 1;
 [name, asked, answers] = argv(){:};
 warning('off', 'all');

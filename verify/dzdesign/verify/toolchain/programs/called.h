@@ -35,7 +35,11 @@ static inline struct dz_drive run_in(void)
     dz_drive_init(&drive);
     drive.side = DZ_SIDE;
     drive.at_rest = 0u;
+#ifdef DZ_STATUS_PRESSURE_C
+    drive.valid_commands = drive.valid_pressures[0];
+#else
     drive.valid_commands = drive.valid_pressures;
+#endif
 #endif
     return drive;
 }
@@ -58,18 +62,19 @@ static inline uint16_t with_dither(const struct dz_plan *plan, uint16_t law, uin
 }
 #endif
 
-/* One input. What the law follows is put where the command is: ramps have run out, the play stands at it. The drive's
+/* One input, of the pressures those ahead and behind; a third one is any code, and changes no output. What the law follows is put where the command is: ramps have run out, the play stands at it. The drive's
  * status is `status` where `care` has bits; without a sound command it waits. A command that turns a drive of two sides
  * to the other one is tried from that one. */
 static inline struct called call(const struct dz_plan *plan, const struct dz_drive *ready, uint16_t u_adc,
-                                 uint16_t p_a, uint16_t p_b, uint16_t status, uint16_t care)
+                                 uint16_t ahead, uint16_t behind, uint16_t status, uint16_t care)
 {
-    struct called found = {DZ_CORE(u_adc, p_a, p_b), 0u};
+    struct called found = {DZ_CORE(u_adc, ahead, behind), 0u};
 #ifdef DZ_SIDE
     const int32_t towards = plan->code_step * ((int32_t)u_adc - plan->zero_code);
     const int32_t place = plan->code_step * ((int32_t)u_adc - plan->first_code);
     const uint16_t up = u_adc & 1u;
     struct dz_drive drive = *ready;
+    uint16_t codes[3] = {0u, 0u, 0u};
 
     if (plan->both != 0 && towards < -plan->leave_zero) {
         return found;
@@ -81,7 +86,17 @@ static inline struct called call(const struct dz_plan *plan, const struct dz_dri
     drive.played = (int16_t)towards;
     drive.ramped = (int32_t)((uint32_t)(plan->both != 0 || towards > 0 ? DZ_SIDE * towards : 0) * (uint32_t)plan->ramp_unit);
     drive.ticks = (uint16_t)((up != 0u ? 2 * plan->dither_ticks : plan->dither_ticks) - 1);
-    dz_drive_sample(&drive, u_adc, p_a, p_b);
+#ifdef DZ_STATUS_PRESSURE_C
+    codes[plan->other_input] = (uint16_t)((u_adc * 40503u) + (behind * 257u));
+    care &= (uint16_t)~plan->other_bit;
+#endif
+    codes[plan->ahead_input] = ahead;
+    codes[plan->behind_input] = behind;
+#ifdef DZ_STATUS_PRESSURE_C
+    dz_drive_sample(&drive, u_adc, codes[0], codes[1], codes[2]);
+#else
+    dz_drive_sample(&drive, u_adc, codes[0], codes[1]);
+#endif
     dz_drive_tick(&drive);
     found.unlike = (uint16_t)((found.law ^ drive.law) | ((drive.status ^ status) & care));
     found.law = drive.law;

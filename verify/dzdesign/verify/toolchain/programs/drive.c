@@ -7,7 +7,18 @@
 #include "bound.h"
 #endif
 
-#define FIELDS 14
+/* Pressures, and channels of faults: the command, the pressures, with a third one those of each side. */
+#ifdef DZ_STATUS_PRESSURE_C
+#define PRESSURES 3
+#define POINTERS(kind) &drive->kind##_pressures[0], &drive->kind##_pressures[1]
+#define OF_PRESSURES(kind) drive->kind##_pressures[0], drive->kind##_pressures[1]
+#else
+#define PRESSURES 2
+#define POINTERS(kind) &drive->kind##_pressures
+#define OF_PRESSURES(kind) drive->kind##_pressures
+#endif
+#define FIELDS (10 + (2 * PRESSURES))
+#define PUTS (2 + (2 * PRESSURES))
 
 struct comparison {
     int32_t ticks, wrong, first, first_field; /* the first wrong one, and its field */
@@ -19,8 +30,8 @@ static const int32_t *compare(const struct dz_drive *drive, const int32_t *expec
     const int32_t state[FIELDS] = {drive->compare_a, drive->compare_b, drive->status, drive->law,
                                    drive->side,      drive->ticks,     drive->at_rest,
                                    drive->rising,    drive->played,    drive->ramped,
-                                   drive->valid_commands,  drive->valid_pressures,
-                                   drive->faulty_commands, drive->faulty_pressures};
+                                   drive->valid_commands,  OF_PRESSURES(valid),
+                                   drive->faulty_commands, OF_PRESSURES(faulty)};
     int32_t field = 0;
 
     while (field < FIELDS && state[field] == expected[field]) {
@@ -34,7 +45,7 @@ static const int32_t *compare(const struct dz_drive *drive, const int32_t *expec
 }
 
 /* What a sample finds, where that is not INT32_MIN: the ramp's place, which samples would take minutes to bring; side,
- * rest and play; what is remembered of faults, sound and faulty samples, two in a word. */
+ * rest and play; what is remembered of faults, sound and faulty samples of each channel. */
 static void put(struct dz_drive *drive, const int32_t *puts)
 {
     if (puts[0] != INT32_MIN) {
@@ -47,14 +58,17 @@ static void put(struct dz_drive *drive, const int32_t *puts)
         drive->played = (int16_t)((puts[1] >> 9) - 8192);
     }
     if (puts[2] != INT32_MIN) {
-        drive->valid_commands = (uint16_t)(puts[2] & 0x7FFF);
-        drive->valid_pressures = (uint16_t)(puts[2] >> 15);
-        drive->faulty_commands = (uint16_t)(puts[3] & 0x7FFF);
-        drive->faulty_pressures = (uint16_t)(puts[3] >> 15);
+        uint16_t *const valid[] = {&drive->valid_commands, POINTERS(valid)};
+        uint16_t *const faulty[] = {&drive->faulty_commands, POINTERS(faulty)};
+
+        for (int32_t channel = 0; channel < PRESSURES; channel++) {
+            *valid[channel] = (uint16_t)puts[2 + (2 * channel)];
+            *faulty[channel] = (uint16_t)puts[3 + (2 * channel)];
+        }
     }
 }
 
-/* PWM periods before the first sample, then those of each sample: three codes, and four words that are put before it. */
+/* PWM periods before the first sample, then those of each sample: its codes, and the words that are put before it. */
 void dz_check_drive(int32_t samples, int32_t ticks, const uint16_t *codes, const int32_t *puts, const int32_t *expected,
                     struct comparison *found)
 {
@@ -65,8 +79,14 @@ void dz_check_drive(int32_t samples, int32_t ticks, const uint16_t *codes, const
     expected = compare(&drive, expected, found);
     for (int32_t sample = -1; sample < samples; sample++) {
         if (sample >= 0) {
-            put(&drive, &puts[4 * sample]);
-            dz_drive_sample(&drive, codes[3 * sample], codes[3 * sample + 1], codes[3 * sample + 2]);
+            const uint16_t *code = &codes[(1 + PRESSURES) * sample];
+
+            put(&drive, &puts[PUTS * sample]);
+#ifdef DZ_STATUS_PRESSURE_C
+            dz_drive_sample(&drive, code[0], code[1], code[2], code[3]);
+#else
+            dz_drive_sample(&drive, code[0], code[1], code[2]);
+#endif
         }
         for (int32_t tick = 0; tick < ticks; tick++) {
             dz_drive_tick(&drive);

@@ -43,7 +43,7 @@ static struct called call_at(const struct dz_plan *plan, const struct dz_drive *
     const uint16_t p_b = (uint16_t)(row->b_low + (uint16_t)(((int32_t)row->first + place) % (int32_t)row->pairs));
 
     return call(plan, ready, code_at(plan, place), (uint16_t)(row->offset + slant[p_b]), p_b,
-                status_at(plan, row->offset * plan->turn), ALL_BITS);
+                status_at(plan, row->offset), ALL_BITS);
 }
 
 /* What an input gives that is not right: of the core's law, or, where the lowest pair of the difference gives the right
@@ -58,13 +58,13 @@ static void note_wrong(const struct dz_plan *plan, const struct dz_drive *ready,
 
     findings->calls++;
     lowest = call(plan, ready, code_at(plan, place), (uint16_t)(row->offset + slant[row->b_low]), row->b_low,
-                  status_at(plan, row->offset * plan->turn), ALL_BITS);
+                  status_at(plan, row->offset), ALL_BITS);
     if (lowest.law == expected && lowest.unlike == 0u) {
         findings->odd++;
         return;
     }
     if (findings->wrong == 0u) {
-        findings->first_row = row->offset * plan->turn - plan->lowest;
+        findings->first_row = row->offset - plan->lowest;
         findings->first_place = place;
         findings->first_found = found.law;
         findings->first_expected = expected;
@@ -79,7 +79,7 @@ static void note_wrong(const struct dz_plan *plan, const struct dz_drive *ready,
 NEAR static uint32_t fill_row(const struct dz_plan *plan, const struct dz_drive *ready, const struct dz_row *row,
                               const int32_t *slant, uint16_t *out)
 {
-    const uint16_t step = (uint16_t)plan->code_step, status = status_at(plan, row->offset * plan->turn);
+    const uint16_t step = (uint16_t)plan->code_step, status = status_at(plan, row->offset);
     const int32_t offset = row->offset;
     uint16_t u_adc = (uint16_t)plan->first_code;
     int32_t pair = row->first, left = plan->codes;
@@ -251,22 +251,18 @@ static void check_cube(const struct dz_plan *plan, const int32_t *slant, const u
 
     for (int32_t code = 0; code < plan->codes; code++) {
         const uint16_t p_b = (uint16_t)code;
-        int32_t low = plan->a_low, high = plan->a_high; /* of pressures A whose difference is -reverse or more */
+        int32_t low = plan->a_low; /* of pressures ahead whose difference is -reverse or more */
 
         if (code < plan->b_low || code > plan->b_high) {
             odd_pairs(plan, &ready, 0, plan->codes - 1, p_b, &safe, 0, findings);
             continue;
         }
-        if (plan->turn > 0) {
-            low = slant[code] - plan->reverse > low ? slant[code] - plan->reverse : low;
-        } else {
-            high = slant[code] + plan->reverse < high ? slant[code] + plan->reverse : high;
-        }
+        low = slant[code] - plan->reverse > low ? slant[code] - plan->reverse : low;
         odd_pairs(plan, &ready, 0, plan->a_low - 1, p_b, &safe, 0, findings);
-        if (low <= high) {
-            const uint16_t *value = &at_zero[plan->turn * (low - slant[code]) - plan->lowest];
+        if (low <= plan->a_high) {
+            const uint16_t *value = &at_zero[low - slant[code] - plan->lowest];
 
-            odd_pairs(plan, &ready, low, high, p_b, value, plan->turn, findings);
+            odd_pairs(plan, &ready, low, plan->a_high, p_b, value, 1, findings);
         }
         odd_pairs(plan, &ready, plan->a_high + 1, plan->codes - 1, p_b, &safe, 0, findings);
     }

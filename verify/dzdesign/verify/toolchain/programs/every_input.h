@@ -27,8 +27,8 @@ struct dz_plan {
     int32_t sound_from, sound_to; /* places of sound commands: from the first to behind the last */
     int32_t zero_place, zero_code;
     int32_t compare_limit;
-    int32_t a_low, a_high, b_low, b_high; /* sound pressure codes */
-    int32_t turn, reverse;                /* the difference is turn * (a - slant[b]); below -reverse it can't be right */
+    int32_t a_low, a_high, b_low, b_high; /* sound codes of the pressures, a ahead and b behind */
+    int32_t reverse;                      /* the difference is a - slant[b]; below minus this it can't be right */
     int32_t lowest;                       /* difference of the first row */
     int32_t safe_law;                     /* the law where the pressures can't be right, and its value at zero command */
     int32_t safe_at_zero;
@@ -41,6 +41,8 @@ struct dz_plan {
     /* Of the drive: its dither, two sides, the codes by which a command leaves zero, a ramp's code, and the status of a
      * difference that can't be right. */
     int32_t dither_counts, dither_ticks, both, leave_zero, ramp_unit, failed_status;
+    /* Which input each pressure is, 0 for A, and its bit of the status; the other one is no pressure of this side. */
+    int32_t ahead_input, behind_input, other_input, ahead_bit, behind_bit, other_bit;
 };
 
 /* A part of the law, straight in the command: counts (and a half) at its first place, and what a place adds. */

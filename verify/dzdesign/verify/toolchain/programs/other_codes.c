@@ -70,11 +70,11 @@ void dz_check_status(const struct dz_plan *plan, const int32_t DZ_TABLE *slant, 
             }
             for (code[moving] = 0; code[moving] <= INT32_C(65535); code[moving] += plan->stride) {
                 const uint16_t a = outside(code[1], low[1], high[1]), b = outside(code[2], low[2], high[2]);
-                uint16_t expected = (uint16_t)(outside(code[0], low[0], high[0]) + 2u * a + 4u * b);
+                uint16_t expected = (uint16_t)(outside(code[0], low[0], high[0]) + (plan->ahead_bit * a) + (plan->behind_bit * b));
 
                 /* Of pressures that are not sound the difference says nothing. */
                 if (!a && !b) {
-                    expected = (uint16_t)(expected + of_difference(plan, plan->turn * (code[1] - slant[code[2]])));
+                    expected = (uint16_t)(expected + of_difference(plan, code[1] - slant[code[2]]));
                 }
                 findings->bad_status +=
                     DZ_STATUS((uint16_t)code[0], (uint16_t)code[1], (uint16_t)code[2]) != expected;
@@ -102,7 +102,7 @@ void dz_check_betas(const struct dz_plan *plan, const uint8_t DZ_TABLE *prepared
 
             findings->bad_betas += DZ_BETA(p_a, tried[k]) != beta;
             findings->bad_status +=
-                DZ_STATUS((uint16_t)plan->zero_code, p_a, tried[k]) != of_difference(plan, plan->turn * row.offset);
+                DZ_STATUS((uint16_t)plan->zero_code, p_a, tried[k]) != of_difference(plan, row.offset);
         }
     }
     for (int32_t index = 0; index < plan->pairs; index++) {
