@@ -15,6 +15,7 @@ from dzdesign.verify.current.corner_runs import CURRENTS, stability_margins
 from dzdesign.verify.current.current_checks import current_checks
 from dzdesign.verify.exhaustive import machine_code
 from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4
+from tests.support.block_cores import block_folder
 from tests.support.current_loops import current_texts
 from tests.support.designs import CURRENT, MEASURED, designed, replaced, written
 from tests.support.evidence import verify
@@ -142,6 +143,12 @@ def test_an_edited_controller_of_two_solenoids_is_seen(fault, of_two, tmp_path):
     assert failing(found.checks) == expected
     assert "current-solenoids" in {check.id for check in found.checks}
     assert len(found.result.faults) == 9 and found.result.changes.phases > of_two.current_drive.loop.held_ticks
+
+
+def test_a_firmware_in_block_form_with_two_solenoids_holds(of_two, tmp_path):
+    folder = block_folder(of_two, tmp_path / "fw")
+    found = current_checks(folder, of_two, silent, STATES)
+    assert failing(found.checks) == set() and len(found.checks) == 6
 
 
 def test_one_code_too_many_in_one_of_a_million_states_is_seen(controlled, tmp_path):
