@@ -161,8 +161,8 @@ def controller_program(
     types = ", ".join(f"uint16_t {word}" for word in words)
     tick = f"void dz_current_tick_fixed(struct dz_current *loop, {types});\n"
     tick += f"#define TICK_BOTH(asked, sum, supply) ((void)(supply), {forms['block']}, {forms['fixed']})\n"
-    tick += f"#define SOLENOIDS {1 + loop.two}u\n#define OFFSET_SUMS {loop.offset_ticks}u\n"
-    tick += f"#define OFFSET_NOMINAL {loop.offset_nominal}u\n"
+    tick += f"#define SOLENOIDS {1 + loop.two}u\n"
+    tick += f"#define OFFSET_SUMS {loop.offset_ticks}u\n#define OFFSET_NOMINAL {loop.offset_nominal}u\n"
     full = min((loop.full_counts << loop.current_shift) // loop.current_gain, LAST - loop.offset_nominal)
     # Full drive's current, sum of codes over 2^16 a PWM count.
     tick += f"#define FULL_SUM UINT32_C({min((full << 16) // max(loop.compare_limit, 1), 2**16)})\n"

@@ -13,16 +13,20 @@ from dzdesign.design.current.responses import CurrentRequest, step_responses, wo
 from dzdesign.design.target_inputs import Converter
 from dzdesign.verify.current.coil import CoilLoop, CoilSimulation
 from dzdesign.verify.current.controller_states import check_states, hashes_on
-from dzdesign.verify.current.corner_runs import HELD_S, fault_runs, run_corner
+from dzdesign.verify.current.corner_runs import HELD_S, fault_runs, run_corner, solenoid_changes
 from dzdesign.verify.toolchain.machines import CORTEX_M4
 from tests.support.current_loops import current_texts
 
 COIL = CoilCircuit(resistance_ohm=3.5, inductance_H=0.04, rated_A=1.0, supply_V=(18.0, 32.0))
 CONVERTER, SAMPLING = Converter(), CurrentSampling()
-#: Sensor, and the limit of the rise.
+PLAIN = CurrentSensor(V_per_A=2.0, offset_V=0.15)
+MEASURED = CurrentSensor(V_per_A=2.0, offset_V=0.15, supply_divider=0.075)
+#: Sensor, limit of the rise, solenoids, shunts.
 FORMS = {
-    "supply unknown": (CurrentSensor(V_per_A=2.0, offset_V=0.15), 10.0),
-    "supply measured": (CurrentSensor(V_per_A=2.0, offset_V=0.15, supply_divider=0.075), 5.0),
+    "supply unknown": (PLAIN, 10.0, 1, 1),
+    "supply measured": (MEASURED, 5.0, 1, 1),
+    "two solenoids, one shunt": (PLAIN, 10.0, 2, 1),
+    "two solenoids, two shunts": (MEASURED, 5.0, 2, 2),
 }
 STATES, QUICK_STATES = 10_000_000, 500_000
 
@@ -30,9 +34,11 @@ STATES, QUICK_STATES = 10_000_000, 500_000
 def print_current_loop(quick: bool = False, seed: int = 0) -> list[Row]:
     """Judge both forms of the loop, print and return the rows."""
     rows = []
-    for name, (sensor, limit_ms) in FORMS.items():
+    for name, (sensor, limit_ms, solenoids, shunts) in FORMS.items():
         say(f"current loop, {name} ...")
-        asked = CurrentRequest(circuit=COIL, sensor=sensor, sampling=SAMPLING, converter=CONVERTER)
+        asked = CurrentRequest(
+            circuit=COIL, sensor=sensor, sampling=SAMPLING, converter=CONVERTER, solenoids=solenoids, shunts=shunts
+        )
         loop = choose_loop(asked, 60000)
         core = current_texts(loop)
         around = CoilLoop(loop=loop, circuit=COIL, sensor=sensor, converter=CONVERTER, sampling=SAMPLING)
@@ -62,8 +68,17 @@ def _settled(name: str, around: CoilLoop, core: dict[str, str], quick: bool) -> 
     found = [run_corner(simulation, corner) for corner in (corners[::13] if quick else corners)]
     if faults := [each for each in found if each.faults]:
         return [Row(what=f"{name}: faults at {faults[0]}", value=faults[0].faults, limit=0)]
-    missed = [fault for fault in fault_runs(simulation) if not fault.holds]
+    missed, changes = [fault for fault in fault_runs(simulation) if not fault.holds], solenoid_changes(simulation)
+    allowed_A = (around.loop.open_sum / around.loop.samples + 1) / around.codes_per_A
+    of_two = [] if changes is None else [
+        Row(what=f"{name}: current in both at once, side changed back after 1 to {changes.phases} periods",
+            value=1e3 * changes.both_A, limit=1e3 * allowed_A, unit="mA", note=f"{changes.corners} corners"),
+        Row(what=f"{name}: from a change of side to the other solenoid's current", value=1e3 * changes.slowest_s,
+            unit="ms"),
+        Row(what=f"{name}: faults of circuits without one", value=changes.faults, limit=0),
+    ]  # fmt: skip
     return [
+        *of_two,
         Row(what=f"{name}: limit cycle in {HELD_S:g} s, of mean current and reading, {len(found)} corners",
             value=max(each.limit_cycle_codes for each in found), limit=2, unit="codes"),
         Row(what=f"{name}: steady error of the reading", value=max(each.steady_error_codes for each in found), limit=1,

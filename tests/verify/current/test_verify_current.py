@@ -15,10 +15,12 @@ from dzdesign.verify.current.corner_runs import CURRENTS, stability_margins
 from dzdesign.verify.current.current_checks import current_checks
 from dzdesign.verify.exhaustive import machine_code
 from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4
+from tests.support.block_cores import block_folder
 from tests.support.current_loops import current_texts
 from tests.support.designs import CURRENT, MEASURED, designed, replaced, written
 from tests.support.evidence import verify
 from tests.support.example_coil import COIL, CONVERTER, SAMPLING, SENSORS, asked, example_loop
+from tests.support.golden_firmware import FULL, golden_valve
 from tests.support.synthetic import needs_compiler
 
 pytestmark = needs_compiler
@@ -100,6 +102,53 @@ def test_an_edited_controller_is_seen(fault, controlled, tmp_path):
     pair, expected = EDITS[fault]
     found = current_checks(firmware_of(controlled, tmp_path / "fw", replaced(pair)), controlled, silent, STATES)
     assert expected <= failing(found.checks)
+
+
+@pytest.fixture(scope="module")
+def of_two():
+    """A compensator of two solenoids with a shunt each, the supply measured."""
+    each = {"current_signal": f"{CURRENT['current_signal']} each", "command_signal": "-10..10 V x 0.12 + 1.5 V"}
+    return designed(golden_valve(FULL), "cortex-m4", **MEASURED | each, transition="2 %", negative_dp="wired")
+
+
+EDITS_OF_TWO = {
+    "none": (None, set()),
+    "the other one driven at once": (
+        ("loop->on_b ^= changes & decayed;", "loop->on_b ^= changes;"),
+        {"current-controller", "current-solenoids", "current-faults"},
+    ),
+    "the decay judged while the output is on": (
+        (" & negative(loop->compare - 1u);", ";"), {"current-controller"},
+    ),
+    "a decay to a tenth of the current": (
+        ("~negative(above - numbers->open_sum)", "~negative(above - (5u * numbers->open_sum))"),
+        {"current-controller", "current-solenoids"},
+    ),
+    "a side that never changes": (
+        ("changes & decayed;", "0u;"), {"current-controller", "current-solenoids", "current-faults"},
+    ),
+    "a switch that stays on is not seen": (("* DZ_CURRENT_HELD)", "* 0u)"), {"current-controller", "current-faults"}),
+    "a fault that names the other": (
+        ("found << (loop->on_b & OF_B)", "found << (~loop->on_b & OF_B)"), {"current-controller", "current-faults"},
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("fault", EDITS_OF_TWO)
+def test_an_edited_controller_of_two_solenoids_is_seen(fault, of_two, tmp_path):
+    pair, expected = EDITS_OF_TWO[fault]
+    found = current_checks(
+        firmware_of(of_two, tmp_path / "fw", replaced(pair) if pair else str), of_two, silent, STATES
+    )
+    assert failing(found.checks) == expected
+    assert "current-solenoids" in {check.id for check in found.checks}
+    assert len(found.result.faults) == 9 and found.result.changes.phases > of_two.current_drive.loop.held_ticks
+
+
+def test_a_firmware_in_block_form_with_two_solenoids_holds(of_two, tmp_path):
+    folder = block_folder(of_two, tmp_path / "fw")
+    found = current_checks(folder, of_two, silent, STATES)
+    assert failing(found.checks) == set() and len(found.checks) == 6
 
 
 def test_one_code_too_many_in_one_of_a_million_states_is_seen(controlled, tmp_path):

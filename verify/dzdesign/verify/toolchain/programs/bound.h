@@ -24,6 +24,6 @@ extern const union dz_bound dz_bound;
 #define dz_current_tick(loop, ...) dz_current_tick(&dz_bound.block, (loop), __VA_ARGS__)
 
 #define DZ_DRIVE_COMMAND_ZERO (dz_bound.block.command_zero)
-#define DZ_CURRENT_OFFSET_TICKS (UINT32_C(SHUNTS) << dz_bound.block.current.offset_shift)
+#define DZ_CURRENT_OFFSET_TICKS ((uint32_t)SHUNTS << dz_bound.block.current.offset_shift)
 
 #endif
