@@ -64,7 +64,7 @@ def current_texts(loop: CurrentLoop, banner: Sequence[str] = ()) -> dict[str, st
     compensator = variant("default")
     built = built_for(compensator, fixed=True)
     sizes = replace(built.sizes, supply_mask=63 if loop.supply else 0)
-    built = replace(built, shape=8 + 16 * bool(loop.supply), samples=loop.samples, sizes=sizes)
+    built = replace(built, shape=64 + 128 * bool(loop.supply), samples=loop.samples, sizes=sizes)
     numbers = replace(numbers_of(compensator), current=current_block(loop, sizes))
     made = texts(valve_files(ValvePage(compensator=compensator, block=numbers, built=built)), banner)
     # The stand-ins for dz_comp.h have these two of their own.

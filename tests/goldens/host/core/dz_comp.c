@@ -85,7 +85,7 @@ static uint32_t invalid_command(const struct dz_calibration *block, uint32_t u)
 }
 
 /* A word whose top bit is set if a code is outside the valid range of its sensor. */
-static uint32_t outside(const struct dz_calibration_sensor *sensor, uint32_t code)
+static uint32_t out_of_range(const struct dz_calibration_sensor *sensor, uint32_t code)
 {
     return (code - sensor->low) | (sensor->high - code);
 }
@@ -163,7 +163,7 @@ uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
     const uint32_t let_go = invalid_command(block, u);
     const uint32_t from_band = u - side->band_end;
     const uint32_t one_outside =
-        outside(&block->sensors[0], p_a_adc) | outside(&block->sensors[1], p_b_adc);
+        out_of_range(&block->sensors[0], p_a_adc) | out_of_range(&block->sensors[1], p_b_adc);
     const uint32_t difference = pressure_difference(side, p_a_adc, p_b_adc);
     const uint32_t failed = failed_pressures(block, one_outside, difference);
     const struct betas beta = betas_at(side, difference, failed);
@@ -187,8 +187,8 @@ uint16_t dz_status(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
     const struct dz_calibration_side *side = &block->sides[0];
     const uint32_t u = u_adc;
     /* The top bit is set if a code is outside its valid range, or the difference beyond its limits. */
-    const uint32_t ahead = outside(&block->sensors[0], p_a_adc);
-    const uint32_t behind = outside(&block->sensors[1], p_b_adc);
+    const uint32_t ahead = out_of_range(&block->sensors[0], p_a_adc);
+    const uint32_t behind = out_of_range(&block->sensors[1], p_b_adc);
     const uint32_t difference = pressure_difference(side, p_a_adc, p_b_adc);
     const uint32_t below = difference + block->reverse;
     const uint32_t above = side->tested_to - difference;
@@ -205,7 +205,7 @@ uint16_t dz_beta(uint16_t p_a_adc, uint16_t p_b_adc)
     const struct dz_calibration *block = &dz_valve;
     const struct dz_calibration_side *side = &block->sides[0];
     const uint32_t one_outside =
-        outside(&block->sensors[0], p_a_adc) | outside(&block->sensors[1], p_b_adc);
+        out_of_range(&block->sensors[0], p_a_adc) | out_of_range(&block->sensors[1], p_b_adc);
     const uint32_t difference = pressure_difference(side, p_a_adc, p_b_adc);
     const uint32_t failed = failed_pressures(block, one_outside, difference);
 
