@@ -66,7 +66,7 @@ def random_frames(count: int, seed: int = 7) -> list[Frame]:
     return [Frame(ticks=rng.randrange(2**32), **{name: rng.randrange(2**16) for name in NAMES}) for _ in range(count)]
 
 
-NAMES = ("origin", "u_adc", "p_a_adc", "p_b_adc", "beta", "compare_a", "compare_b", "status")
+NAMES = ("origin", "u_adc", "p_a_adc", "p_b_adc", "p_c_adc", "beta", "compare_a", "compare_b", "status")
 
 
 def read(octets: bytes) -> tuple[list[Frame], FrameReader]:
