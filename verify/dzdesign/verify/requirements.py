@@ -86,7 +86,7 @@ FALLBACK = Requirement(id="fallback", title="codes outside their signal's valid 
 DRIVE = Requirement(id="drive", title="the drive follows its model")
 #: Of a compensator that says with which options it was designed.
 ASKED_FOR = Requirement(
-    id="asked-for", title="the drive's functions are those that were asked for", how=f"{OF_SOME}that says its options"
+    id="asked-for", title="drive and signals are those that were asked for", how=f"{OF_SOME}that says its options"
 )
 PLANT_OPENS = Requirement(id="plant-opens", title="the plant of the closed loop opens")
 PLANT_IS_THE_VALVE = Requirement(id="plant-is-the-valve", title="the plant agrees with the identified valve")

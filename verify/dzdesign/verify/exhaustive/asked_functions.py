@@ -1,9 +1,10 @@
-"""Whether the drive's numbers are those that were asked for: the options' texts are read once more, by own rules.
+"""Whether the numbers of drive and signals are those asked for: the options' texts are read once more, by own rules.
 
-The drive's model takes the same numbers as the C, so it can't see that `design` made them wrong.
+The models of drive and law take the same numbers as the C, so they can't see that `design` made them wrong.
 """
 
 import re
+from collections.abc import Iterator
 from fractions import Fraction
 from math import ceil
 
@@ -14,14 +15,21 @@ NUMBER = r"(\d+(?:\.\d+)?)"
 TIME = re.compile(rf"{NUMBER} ?(s|ms)", re.ASCII)
 SAMPLES = re.compile(r"(\d+) ?samples?", re.ASCII)
 SHARE = re.compile(rf"{NUMBER} ?%", re.ASCII)
+#: A signal's ends, what brings it to the converter's pin, and what its ends stand for.
+SIGNAL = re.compile(
+    rf"(?P<low>-?{NUMBER})\.\.(?P<high>{NUMBER}) (?P<unit>V|mA)(?: on (?P<ohm>{NUMBER}) ohm)?(?: x (?P<gain>{NUMBER}))?"
+    rf"(?: \+ (?P<offset>{NUMBER}) V)?(?: = (?:(?P<bottom>-?{NUMBER})\.\.)?(?P<top>{NUMBER}) (?P<means>MPa|bar|V|%))?",
+    re.ASCII,
+)
+SPAN = re.compile(rf"(?P<top>{NUMBER}) (?P<means>MPa|bar)", re.ASCII)
 WAVE = re.compile(rf"{NUMBER} ?Hz {NUMBER} ?%", re.ASCII)
 #: Units of the ramped command in a code; a negative pressure drop beyond this share of the span is a failure.
 UNITS, REVERSE = 65536, Fraction(1, 50)
 
 
 def functions_asked_for(compensator: Compensator) -> Check:
-    """Compare ramps, debounce, latch, interlock, dither, limit and the reverse drop with the options."""
-    texts, faults = compensator.options or {}, list[str]()
+    """Compare signals, ramps, debounce, latch, interlock, dither, limit and the reverse drop with the options."""
+    texts, faults = compensator.options or {}, list(_signals_not_asked_for(compensator))
     functions, signals = compensator.drive_functions, compensator.signals
     for name, found in (("ramp_up", functions.ramp_up), ("ramp_down", functions.ramp_down)):
         parts = [_seconds(part) for part in texts.get(name, "0 s").split("/")]
@@ -58,7 +66,41 @@ def functions_asked_for(compensator: Compensator) -> Check:
     if compensator.reverse_codes > REVERSE * span:
         most = int(REVERSE * span)
         faults.append(f"a drop of -{compensator.reverse_codes} codes is no failure, expected {most} at most")
-    return ASKED_FOR.check(holds=not faults, text="; ".join(faults) or "ramps, faults, interlock, dither and limit")
+    named = "signals, ramps, faults, interlock, dither and limit"
+    return ASKED_FOR.check(holds=not faults, text="; ".join(faults) or named)
+
+
+def _signals_not_asked_for(compensator: Compensator) -> Iterator[str]:
+    """Say which signal has other codes than its text makes, or a sensor another span; other units are not compared."""
+    texts, signals, target = compensator.options or {}, compensator.signals, compensator.target
+    if target is None:
+        return
+    for name in ("command_signal", "pressure_a", "pressure_b"):
+        text = texts.get(name, "")
+        found = SIGNAL.fullmatch(text)
+        if found is None or (found["unit"] == "mA") != bool(found["ohm"]):
+            continue
+        per_unit = Fraction(found["gain"] or 1) * Fraction(found["ohm"] or 1000) / 1000
+        ends = [Fraction(found[end]) * per_unit + Fraction(found["offset"] or 0) for end in ("low", "high")]
+        low, high = (target.converter.levels * volts / target.converter.full_V for volts in ends)
+        wanted: tuple[Fraction | None, ...] = (low, high)
+        if name == "command_signal":
+            both = Fraction((found["bottom"] or 0) if found["top"] else found["low"]) < 0
+            low, high = (high, low) if texts.get("polarity") == "inverted" else (low, high)
+            wanted = ((low + high) / 2, high, low) if both else (low, high, None)
+            command = signals.command
+            made: tuple[int | None, ...] = (command.zero_code, command.full_code, command.negative_full_code)
+        else:
+            sensor = signals.pressure_a if name == "pressure_a" else signals.pressure_b
+            made = (sensor.zero_code, sensor.full_code)
+            span = found if found["top"] else SPAN.fullmatch(texts.get("pressure_span", ""))
+            span_MPa = Fraction(span["top"]) / (10 if span["means"] == "bar" else 1) if span else sensor.span_MPa
+            if abs(sensor.span_MPa - span_MPa) > Fraction(1, 10**6):
+                yield f"{name} spans {float(sensor.span_MPa):g} MPa, asked for were {float(span_MPa):g} MPa"
+        for code, exact in zip(made, wanted, strict=True):
+            if (code is None) != (exact is None) or (code is not None and exact is not None and abs(code - exact) > 1):
+                asked = "none" if exact is None else f"{float(exact):.1f}"
+                yield f"{name} has a code of {code} at its zero or an end, {text!r} makes {asked}"
 
 
 def _seconds(text: str) -> Fraction | None:

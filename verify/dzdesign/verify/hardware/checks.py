@@ -17,7 +17,7 @@ from dzdesign.verify import requirements
 from dzdesign.verify.exhaustive.exact_drive import STEP_UNIT, DriveModel
 from dzdesign.verify.hardware.exact_current import ExactCurrent
 from dzdesign.verify.hardware.model import HIGH, LOW, Bench, Due, Step, Trace
-from dzdesign.verify.hardware.serial_line import line_fault, load_begins
+from dzdesign.verify.hardware.serial_line import line_fault, load_begins, load_fault
 from dzdesign.verify.requirements import Check, Requirement
 
 #: A trip acts without a clock, and lost samples are seen within these times.
@@ -34,6 +34,8 @@ HELD_PER_A = 1e4
 WRITTEN_PERIODS = 4
 #: PWM periods after which an output is released at the latest, once the trip input is high.
 RELEASE_PERIODS = 6
+#: PWM periods for which a load is followed, a frame and the reply: fewer than it waits for its next request.
+LOADED_PERIODS = 15
 #: Least and most samples of each set of codes; in between so many that a ramp goes this share of the command.
 SAMPLES_OF_CODES, RAMPED = (5, 200), 0.06
 #: Codes, of the command and of each pressure.
@@ -159,6 +161,25 @@ class HardwareRuns:
         steps += [*self.coil(), *self.supply(), *load_begins(self.bench, driven_us)]
         later_us = LATER_US if self.bench.runs_user_code else 0.0
         return self.bench.run(steps, self.followed[-1][0] + self.set_us + later_us)
+
+    @cached_property
+    def asked_us(self) -> float:
+        """When a load begins at zero command: just after an interrupt, and no frame is under way."""
+        trace, period_us = self.following, self.period_us
+        sent = [1e3 * trace.ms_of(at) for at in trace.times("octet")]
+        interrupts = (1e3 * trace.ms_of(at) for at in trace.times("interrupt"))
+        return 1 + next(
+            at_us
+            for at_us in interrupts
+            if at_us > self.followed[1][0] and not any(-1 < (end - at_us) / period_us < 3 for end in sent)
+        )
+
+    @cached_property
+    def loading(self) -> Trace:
+        """Zero command, at which a load begins."""
+        steps = [*self.codes(-1.0, self.followed[0][1]), *self.coil(), *self.supply()]
+        steps += load_begins(self.bench, self.asked_us)
+        return self.bench.run(steps, self.asked_us + LOADED_PERIODS * self.period_us)
 
     @cached_property
     def written(self) -> list[tuple[float, int, int]]:
@@ -364,7 +385,9 @@ def _halts(runs: HardwareRuns) -> str:
 
 
 def _tells(runs: HardwareRuns) -> str:
-    return line_fault(runs.bench, runs.following, runs.due)
+    if fault := line_fault(runs.bench, runs.following, runs.due):
+        return fault
+    return load_fault(runs.bench, runs.loading, runs.asked_us) if runs.bench.block else ""
 
 
 def _loses_samples(runs: HardwareRuns) -> str:

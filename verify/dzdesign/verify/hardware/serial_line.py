@@ -1,4 +1,4 @@
-"""The serial line: what the frames of the telemetry say, and that no block is taken while the valve is driven.
+"""The serial line: what the frames of the telemetry say, and when a block is taken: at zero command, the output held.
 
 A frame, its most significant octets first: sync, version, octets of the payload; ticks, start of the compensator's
 hash, codes, beta, compare values and status; CRC-16/IBM-3740 of all but sync. A request to load a block is alike.
@@ -19,7 +19,7 @@ RELEASED = 0x0080
 #: Nominal bits per second, what a receiver bears, and the bits of an octet.
 BAUD, BAUD_ERROR, OCTET_BITS = 115_200, 0.02, 10
 #: Begins a load; a reply says so with a bit more. Reasons to refuse it: the drive moves, the command is not zero.
-REQUEST_BEGINS, REPLY_BEGINS, REFUSED = b"\xc3\x3c\x01\x01", b"\xc3\x3c\x81\x01", {5, 6}
+REQUEST_BEGINS, REPLY_BEGINS, TAKEN, REFUSED = b"\xc3\x3c\x01\x01", b"\xc3\x3c\x81\x01", {0}, {5, 6}
 REASON_AT = 5
 
 
@@ -28,16 +28,41 @@ def _crc(octets: bytes) -> int:
 
 
 def load_begins(bench: Bench, at_us: float) -> list[Step]:
-    """Return the steps by which a PC begins to load a block: the one that the firmware has."""
+    """Return the steps of a PC that begins to load a block, the one of the firmware; the last octet comes then."""
     if not bench.block:
         return []
     request = REQUEST_BEGINS + pack(">BH", 10, len(bench.block) // 2) + bench.block[-4:] + bytes(4)
     request += pack(">H", _crc(request))
     octet_us = 1e6 * OCTET_BITS / BAUD
     return [
-        Step(at_us + place * octet_us, "octet", octet, bench.board["SCI_RX_GPIO"])
-        for place, octet in enumerate(request)
+        Step(at_us - place * octet_us, "octet", octet, bench.board["SCI_RX_GPIO"])
+        for place, octet in enumerate(reversed(request))
     ]
+
+
+def _reply(octets: bytes) -> tuple[int, set[int]]:
+    """Return the place of the reply to a load's begin, -1 without one, and its reason."""
+    reply = octets.find(REPLY_BEGINS)
+    return reply, set(octets[reply + REASON_AT : reply + REASON_AT + 1]) if reply >= 0 else set()
+
+
+def load_fault(bench: Bench, trace: Trace, asked_us: float) -> str:
+    """Return what is wrong in a run at zero command where a load begins at a time, just after an interrupt, or nothing.
+
+    Memory is erased before the reply, and the interrupt can't read a flash that is being erased: it holds the output
+    first.
+    """
+    sent = [each for each in trace.events if each[1:3] == ("octet", bench.board["SCI_TX_GPIO"])]
+    reply, reason = _reply(bytes(each.two for each in sent))
+    if reason != TAKEN:
+        return "a calibration block is not taken at zero command"
+    replied, asked = sent[reply].at, trace.count_at(asked_us)
+    if not any(asked < at < replied for at in trace.times("interrupt")):
+        return "the memory for a calibration block is erased before the interrupt holds the output"
+    for gpio in bench.pins:
+        if trace.pin(gpio).not_low_from(replied, trace.end) is not None:
+            return f"GPIO{gpio} is not low while a calibration block is loaded"
+    return ""
 
 
 def line_fault(bench: Bench, trace: Trace, due: list[Due]) -> str:
@@ -51,10 +76,8 @@ def line_fault(bench: Bench, trace: Trace, due: list[Due]) -> str:
         if abs(baud / BAUD - 1) > BAUD_ERROR:
             return f"an octet takes as long as {OCTET_BITS} bits at {baud:.0f} bit/s, expected {BAUD} bit/s"
     octets = bytes(sent)
-    if bench.block:
-        reply = octets.find(REPLY_BEGINS)
-        if reply < 0 or not set(octets[reply + REASON_AT : reply + REASON_AT + 1]) & REFUSED:
-            return "a calibration block is not refused while the valve is driven"
+    if bench.block and not _reply(octets)[1] & REFUSED:
+        return "a calibration block is not refused while the valve is driven"
     laws = {sign: ExactLaw(bench.compensator, sign) for sign in bench.compensator.signals.signs}
     frames, at = 0, octets.find(FRAME_BEGINS)
     while 0 <= at <= len(octets) - FRAME.size:
