@@ -158,8 +158,8 @@ def _left_out(compensator: Compensator) -> list[str]:
     if compensator.negative is not None or compensator.valve.sides.get("negative") is None:
         return []
     return [
-        "the valve's negative side is left out: the command has one sign; give a --command-signal of both to drive "
-        "two solenoids"
+        "the valve's negative side is left out: the command has one sign; leave out --command-signal, or give one of "
+        "both signs, to drive two solenoids"
     ]
 
 

@@ -264,8 +264,8 @@ class DesignChoices:
     close above its opening threshold. broken-sensor: a failure of a pressure signal raises the offset undetected."""
     command_signal: Annotated[Text, Option("S", CONNECTIONS, example="0..10 V x 0.3")] = None
     """Signal of the command at the converter: range, shunt, attenuator, offset and represented command (default: 0 to
-    10 V over the converter's whole range). Examples with both signs are "-10..10 V x 0.12 + 1.5 V" and "4..20 mA on 150
-    ohm = -10..10 V"."""
+    10 V over the converter's whole range; of a valve with both sides -10 to 10 V about its middle). Examples with both
+    signs are "-10..10 V x 0.12 + 1.5 V" and "4..20 mA on 150 ohm = -10..10 V"."""
     polarity: Annotated[Text, Option("P", CONNECTIONS, "normal", choices=POLARITIES)] = None
     """Polarity of the command. normal: more signal is more command. inverted: more signal is less command."""
     pressure_span: Annotated[Text, Option("P", CONNECTIONS, "20 MPa", example="20 MPa", read=quantity("pressure"))] = (

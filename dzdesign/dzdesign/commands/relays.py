@@ -63,8 +63,7 @@ def _written(result: Any, arguments: Any) -> tuple[str, ...]:
 
 
 def _after_identify(valve: Any, arguments: Any) -> tuple[str, ...]:
-    of_both = ' --command-signal "-10..10 V x 0.12 + 1.5 V"' if len(valve.sides) > 1 else ""
-    return (*_written(valve, arguments), f"Next: dzdesign design {_word(os.fspath(arguments.output))}{of_both}")
+    return (*_written(valve, arguments), f"Next: dzdesign design {_word(os.fspath(arguments.output))}")
 
 
 def _after_design(compensator: Any, arguments: Any) -> tuple[str, ...]:

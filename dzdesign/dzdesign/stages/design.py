@@ -33,8 +33,8 @@ class DesignArguments(DesignChoices):
     """Microcontroller whose converter and timer the law is designed for. `codegen --list-targets` lists them."""
 
 
-def design_options(choices: DesignChoices, target: str) -> "DesignOptions":
-    """Return the options of `design`.
+def design_options(choices: DesignChoices, target: str, *, both_sides: bool = False) -> "DesignOptions":
+    """Return the options of `design`; of a valve with both sides the command has both signs unless it is given.
 
     Raises
     ------
@@ -46,7 +46,12 @@ def design_options(choices: DesignChoices, target: str) -> "DesignOptions":
 
     board = read_options(choices, ["crystal", "channels"])
     inputs = target_named(target).on_board(board["crystal"], board["channels"] or ()).inputs()
-    options = options_of({name: getattr(choices, name) or "" for name in DEFAULTS}, inputs)
+    texts = {name: getattr(choices, name) or "" for name in DEFAULTS}
+    if both_sides and not texts["command_signal"]:
+        # The converter's range is the middle of it and two fifths to either side: beyond full command a fault is seen.
+        full_V = float(inputs.converter.full_V)
+        texts["command_signal"] = f"-10..10 V x {0.04 * full_V:.12g} + {0.5 * full_V:.12g} V"
+    options = options_of(texts, inputs)
     if options.signals.command.negative_full_code is not None:
         return options
     useless = [flag_of(name) for name in OF_BOTH_SIGNS if getattr(choices, name) not in (None, DEFAULTS[name])]
@@ -92,14 +97,14 @@ def design(arguments: DesignArguments) -> "Compensator":
     from dzdesign.design.designing import design as design_valve
     from dzdesign.identify.valve.model import ValveModel
 
-    options = design_options(arguments, arguments.target)
+    design_options(arguments, arguments.target, both_sides=True)  # a wrong option is refused before a wrong file
     if arguments.output is not None:
         check_file_may_be_written(Path(arguments.output), SCHEMA)
-    if isinstance(arguments.valve, ValveModel):
-        compensator = design_valve(arguments.valve, options)
-    else:
-        content = read_bytes(Path(arguments.valve), "valve file")
-        compensator = design_valve(read_artefact(content, ValveModel, os.fspath(arguments.valve)), options)
+    valve = arguments.valve
+    if not isinstance(valve, ValveModel):
+        valve = read_artefact(read_bytes(Path(valve), "valve file"), ValveModel, os.fspath(valve))
+    options = design_options(arguments, arguments.target, both_sides=len(valve.sides) > 1)
+    compensator = design_valve(valve, options)
     if arguments.output is not None:
         write_file(Path(arguments.output), to_json_bytes(compensator), SCHEMA)
     return compensator
