@@ -17,11 +17,10 @@ from dzdesign.core.recorded_units import AS_COMPUTED, FlowUnit, RecordedUnits
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.valve.model import ValveModel
-from dzdesign.report.artefacts import Chain, standing_warnings
+from dzdesign.report.artefacts import Chain
 from dzdesign.report.figure import figure_style
 from dzdesign.report.sections.characteristic import characteristic_figure, characteristic_section
 from dzdesign.report.sections.closed_loop import scenarios_table
-from dzdesign.report.sections.provenance import warnings_section
 from dzdesign.report.sections.quantities import characteristic_curves, characteristic_quantities
 from dzdesign.report.sections.valve import RECORDED, conditions_section
 from dzdesign.report.summary import key_figures, measured_figures, unrequired_flow, valve_name
@@ -30,9 +29,8 @@ from dzdesign.verify.closed_loop.drive_corners import NOT_DECLARED
 from dzdesign.verify.closed_loop.scene import NO_CORE_CAN_KNOW
 from dzdesign.verify.loop_results import ScenarioResult
 from tests.support.bench_recordings import AFTER, BEFORE, L_MIN, record
-from tests.support.designs import BOTH_SIGNS, designed
+from tests.support.designs import designed
 from tests.support.evidence import LOOP, evidence_with, pressure_result, read_evidence
-from tests.support.golden_firmware import FULL, golden_valve
 from tests.support.paths import ROOT
 from tests.support.synthetic import Truth, needs_compiler, synthetic_ramp
 
@@ -40,18 +38,6 @@ RUN = ScenarioResult(
     name="sensor A is stuck", side="positive", dp_MPa=1.0, back_MPa=0.0, leak_L_min=0.0, allowed_at_zero_L_min=None,
     unseen_below_L_min=None, q_zero_L_min=0.0, q_peak_at_zero_L_min=0.0, must_shut=True, not_required="", figures={},
 )  # fmt: skip
-
-
-def test_a_side_that_is_driven_is_not_said_to_be_left_out():
-    """Seeded: the report of a firmware for commands of both signs warned that it drives one side."""
-    both_sides = golden_valve(FULL)
-    one, both = designed(both_sides), designed(both_sides, command_signal=BOTH_SIGNS)
-    for compensator, said in ((one, True), (both, False), (None, True)):
-        ((_, lines), *_) = warnings_section(both_sides, compensator).groups
-        assert any(line.startswith("[two-sides]") for line in lines) is said
-        assert ("two-sides" in {each.code for each in standing_warnings(both_sides, compensator)}) is said
-        others = [each for each in standing_warnings(both_sides, compensator) if each.code != "two-sides"]
-        assert others == [each for each in both_sides.warnings if each.code != "two-sides"]
 
 
 def card(label, pressures, compensator=None, *inputs):

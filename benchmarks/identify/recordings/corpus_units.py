@@ -302,9 +302,7 @@ def _misprinted(case: Case, valve: dict, printed: str) -> Iterator[str]:
         if not re.fullmatch(unit, shown)
     ]
     for line in printed.splitlines():
-        if line.startswith("  dzdesign design"):  # the next command, with an example of a range
-            continue
-        # Ranges and options are quoted as they are written, and `two-sides` has an example of one.
+        # Ranges and options are quoted as they are written.
         said = re.sub(r"'[^']*'|\(\S+\.\.[^)]*\)", "", line)
         for found in filter(None, (each.search(said) for each in foreign)):
             yield f"'{found[0]}' is printed in '{line[:60]}'"

@@ -16,7 +16,6 @@ from dzdesign.core.placing import make_folder
 from dzdesign.design.compensator import Compensator
 from dzdesign.identify.valve.model import SIDES, ValveModel
 from dzdesign.identify.valve.test_record import checked_record
-from dzdesign.report.artefacts import standing_warnings
 from dzdesign.report.lot.folder import is_lot
 from dzdesign.report.lot.summary import (
     AGAIN,
@@ -85,7 +84,7 @@ def table_of_valves(
     rows: list[dict[str, Cell]] = []
     for each in sorted(valves, key=lambda valve: by_name(valve.name)):
         manifest, own = each.manifest, each.compensator
-        standing = standing_warnings(own.valve, own) if own else ()
+        standing = own.valve.warnings if own else ()
         row: dict[str, Cell] = {"name": each.name, "status": manifest.status, "reason": manifest.reason}
         for side in SIDES if both else ("",):
             row |= {column_of(side, column): None for column in SIDE_COLUMNS}

@@ -111,7 +111,6 @@ def _identified(
             (
                 *about_recordings(tests),
                 *about_rest(tests, options.u_max),
-                *([warn("two-sides")] if len(sides) > 1 else []),
                 *about_whole_meter(zeros, tests, options.u_max),
                 *warnings,
             )

@@ -20,7 +20,7 @@ from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest, OutputManifest, setting_words
 from dzdesign.design.side_law import SideLaw
-from dzdesign.identify.valve.model import SIDES, ValveModel, Warning_
+from dzdesign.identify.valve.model import SIDES, ValveModel
 from dzdesign.verify.closed_loop.ramps import Curves, read_curves
 from dzdesign.verify.evidence import Evidence, OutputEvidence
 from dzdesign.verify.folder import added_files, read_compensator
@@ -40,8 +40,6 @@ OF_MADE: tuple[type[Evidence | OutputEvidence], ...] = (Evidence, OutputEvidence
 #: Folders beside a valve's artefacts, as the commands call them.
 EVIDENCE, FIRMWARE = "evidence", "firmware"
 WROTE = "`dzdesign verify` wrote another one"
-#: Of a valve, what a design for commands of both signs has made untrue: that one side is left out.
-OF_ONE_SIGN = "two-sides"
 #: Verdicts, from the one that counts before all others.
 COUNTS_FIRST = (False, None, True)
 #: Files that a sentence names.
@@ -227,12 +225,6 @@ def _refuse_changes(folder: Path, firmware: FirmwareManifest, evidence: Evidence
 def laws_of(compensator: Compensator | None) -> dict[str, SideLaw]:
     """Return the law of each side that has one."""
     return {name: law for name in SIDES if compensator and (law := getattr(compensator, name))}
-
-
-def standing_warnings(valve: ValveModel | None, compensator: Compensator | None) -> tuple[Warning_, ...]:
-    """Return the warnings of a valve without what its compensator, made for commands of both signs, has settled."""
-    drives_both = len(laws_of(compensator)) == len(SIDES)
-    return tuple(each for each in (valve.warnings if valve else ()) if not (drives_both and each.code == OF_ONE_SIGN))
 
 
 # --- other outputs of the same compensator ------------------------------------------------------------------

@@ -88,9 +88,9 @@ class TestSides:
         mirrored = [replace(test, source=f"minus_{test.source}", u=-test.u, q=-test.q) for test in tests]
         one = {warning.text for warning in identify(tests).warnings}
         two = identify([*mirrored, *tests]).warnings
-        both = [each.text for each in two if each.code != "two-sides" and not each.source]
+        both = [each.text for each in two if not each.source]
         assert both and {text.removeprefix("both sides: ") for text in both} <= one
-        unlike = [each.text for each in identify([*tests, mirrored[0]]).warnings if each.code != "two-sides"]
+        unlike = [each.text for each in identify([*tests, mirrored[0]]).warnings]
         assert {text.partition(" side")[0] for text in unlike} == {"both", "positive", "negative"}
 
     def test_a_side_without_data_is_said_to_be_missing(self, valve, wording):

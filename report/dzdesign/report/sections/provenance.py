@@ -15,7 +15,7 @@ from dzdesign.design.pressure_inputs import signals_in_words
 from dzdesign.design.redesign import without_sensors
 from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.identify.valve.model import ValveModel
-from dzdesign.report.artefacts import ROLES, Chain, standing_warnings
+from dzdesign.report.artefacts import ROLES, Chain
 from dzdesign.report.page import (
     Cell,
     Figure,
@@ -44,7 +44,7 @@ def warnings_section(valve: ValveModel | None, compensator: Compensator | None) 
     accepted = compensator.options.get("accept", "") if compensator and compensator.options else ""
     codes = accepted.replace(",", " ").split()
     warnings = []
-    for warning in standing_warnings(valve, compensator):
+    for warning in valve.warnings if valve else ():
         source = f"{warning.source}: " if warning.source else ""
         end = ", which it was (--accept)" if warning.code in codes else ""
         warnings.append(f"[{warning.code}] {source}{warning.text}{end}")
