@@ -2,17 +2,22 @@
 
 import re
 import subprocess
+from dataclasses import replace
 from fractions import Fraction
 
 import pytest
 
 from dzdesign import api
-from dzdesign.codegen.project import generate, target_for, target_named
+from dzdesign.codegen.c2000 import ROLES
+from dzdesign.codegen.project import generate, inputs_of, target_for, target_named
 from dzdesign.core.errors import InputError
 from dzdesign.design.design_choices import DesignChoices
 from dzdesign.regeneration import regenerated
 from dzdesign.stages.design import design_options
 from dzdesign.verify.toolchain.host_compiler import host_compiler
+from tests.support.core_variants import variant
+from tests.support.designs import BOTH_SIGNS
+from tests.support.golden_firmware import FULL, golden_valve
 from tests.support.synthetic import needs_compiler
 
 
@@ -64,6 +69,27 @@ def test_a_folder_of_a_declared_board_is_designed_and_generated_again(example_va
     assert again.files["f28335/dz_board.h"] == (tmp_path / "fw/f28335/dz_board.h").read_bytes()
 
 
+@pytest.mark.parametrize(
+    ("channels", "given", "expected"), [("A0 A1 A2 A3", {}, 3), ("A0 A1 A2", {"negative_dp": "A-C"}, 4)]
+)
+def test_channels_that_are_not_as_many_as_the_inputs_are_refused(channels, given, expected):
+    valve = golden_valve(FULL)
+    sides = {name: replace(side, recorded_drop=None) for name, side in valve.sides.items()}
+    with pytest.raises(InputError, match=f"expected {expected} of these inputs"):
+        api.design(replace(valve, sides=sides), channels=channels, command_signal=BOTH_SIGNS, **given)
+
+
+def test_the_third_pressure_has_the_channel_behind_those_of_the_others():
+    compensator = variant("three pressures")
+    assert inputs_of(compensator) == ("command", "pressure_a", "pressure_b", "pressure_c")
+    for channels, expected in (("A5 A4 A0 A3", "3"), (None, "6")):
+        declared = tuple(channels.split()) if channels else ()
+        target = target_named("f28335").on_board(None, declared, inputs_of(compensator))
+        assert target.context["pressure_c_number"] == expected
+        numbers = [target.context[f"{role}_number"] for role in ROLES]
+        assert len(set(numbers)) == len(numbers)
+
+
 REFUSED = [
     ("f28335", {"crystal": "10 MHz"}, "can't be clocked"),
     ("f28335", {"crystal": "33.333 MHz"}, "can't be clocked"),
@@ -71,7 +97,6 @@ REFUSED = [
     ("f28335", {"channels": "A0 A1"}, "expected the channels"),
     ("f28335", {"channels": "A0 A1 A1"}, "expected the channels"),
     ("f28335", {"channels": "A0 A1 A9"}, "has no channel 'A9'"),
-    ("f28335", {"channels": "A0 A1 A2 A3"}, "expected 3 of these inputs"),
     ("f280049c", {"crystal": "20 MHz"}, "device.h"),
     ("f280049c", {"channels": "A0 A1 B2"}, "has no channel 'B2'"),
     ("host", {"channels": "A0 A1 A2"}, "target host has none"),

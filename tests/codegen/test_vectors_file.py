@@ -15,14 +15,18 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.side_law import Sides
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.toolchain.host_compiler import host_compiler, words_of
+from tests.support.core_variants import variant
 from tests.support.documented_commands import FILE
 from tests.support.golden_firmware import FULL, golden_compensator
 from tests.support.paths import ROOT
 from tests.support.synthetic import needs_compiler
 
 READER = dict(FILE.findall((ROOT / "docs" / "howto" / "core-only.md").read_text("utf-8")))["check_vectors.c"]
-#: A command of one sign; two solenoids, unlike sensors and the pressures turned round; one table, without a transition.
-DEFAULT, FULL_SET, ONE_TABLE = NAMES = ("default", "everything switched on", "no transition")
+#: A command of one sign; two solenoids, unlike sensors and the pressures turned round; one table, without a transition;
+#: three pressures.
+DEFAULT, FULL_SET, ONE_TABLE, THREE = NAMES = (
+    "default", "everything switched on", "no transition", "three pressures"
+)  # fmt: skip
 #: Of each sign: what its functions' names end with, and its first column.
 SIDES = {1: ("", 3), -1: ("_negative", 6)}
 HEADERS = ("dz_comp.h", "dz_calibration.h", "dz_valve.h")
@@ -46,7 +50,8 @@ def without_transition(compensator):
 def firmwares():
     """Firmware with no more vectors than are required."""
     default = golden_compensator("host")
-    compensators = (default, golden_compensator("host", FULL), without_transition(default))
+    others = golden_compensator("host", FULL), without_transition(default), variant("three pressures")
+    compensators = (default, *others)
     made = (generate(each, "host", vectors=fewest(each)) for each in compensators)
     return dict(zip(NAMES, made, strict=True))
 
@@ -63,21 +68,21 @@ def test_every_node_corner_and_fault_is_among_the_fewest(name, firmwares):
     signals, limit = compensator.signals, compensator.drive_functions.compare_limit
     _, rows = table(firmwares[name])
     assert len(rows) == len(set(rows)) == firmwares[name].manifest.vectors
-    low_a, high_a = signals.pressure_a.valid_codes
-    low_b, high_b = signals.pressure_b.valid_codes
     for sign in signals.signs:
-        column = SIDES[sign][1]
+        column, pair = SIDES[sign][1], signals.pair(sign)
+        low_a, high_a = pair.ahead.valid_codes
+        low_b, high_b = pair.behind.valid_codes
         sound = [row for row in rows if low_a <= row[1] <= high_a and low_b <= row[2] <= high_b]
         by_drop = {}
         for row in sound:
             away = signals.command.direction(sign) * (row[0] - signals.command.zero_code)
-            by_drop.setdefault(signals.difference(row[1], row[2], sign), {})[away] = row[column]
-        largest, step = signals.pair(sign).largest_difference, compensator.beta_step_codes
+            by_drop.setdefault(pair.difference(row[1], row[2]), {})[away] = row[column]
+        largest, step = pair.largest_difference, compensator.beta_step_codes
         nodes = {node + by for node in range(0, largest + 1, step) for by in (-1, 0, 1)}
         for drop in (drop for drop in nodes if drop <= largest):
             assert 0 in by_drop[drop] and any(away >= max(compensator.transition_end, 1) for away in by_drop[drop])
         reverse, span = compensator.reverse_codes, signals.command.span(sign)
-        tested_to = int(signals.pair(1).dp_code(compensator.side(sign).certificate.dp_MPa[1]))
+        tested_to = int(pair.dp_code(compensator.side(sign).certificate.dp_MPa[1]))
         assert {-reverse - 1, -reverse, tested_to, tested_to + 1, largest} <= set(by_drop)
         corners = {compensator.zero_band_codes, compensator.transition_end, span}
         around = {corner + by for corner in corners for by in (-1, 0, 1)}
@@ -89,13 +94,14 @@ def test_every_node_corner_and_fault_is_among_the_fewest(name, firmwares):
             assert not reached or by_drop[drop][reached[0] - 1] < limit
         assert name != FULL_SET or reached  # the others stay below it
         bits = {row[column + 1] for row in rows}
-        assert {0, 1, 2, 4, 6, 7, 8, 16} <= bits
-    for place, signal in enumerate((signals.command, signals.pressure_a, signals.pressure_b)):
-        low, high = signal.valid_codes
-        tried = {row[place] for row in rows}
-        assert {code for code in (low - 1, low, high, high + 1, signals.code_max + 1, 65535) if code >= 0} <= tried
-    ends = {(row[1], row[2]) for row in rows}
-    assert {(a, b) for a in (low_a, high_a) for b in (low_b, high_b)} <= ends
+        one, other = ({"A": 2, "B": 4, "C": 512}[each] for each in pair.names)
+        assert {0, 1, one, other, one + other, 1 + one + other, 8, 16} <= bits
+        for place, signal in enumerate((signals.command, pair.ahead, pair.behind)):
+            low, high = signal.valid_codes
+            tried = {row[place] for row in rows}
+            assert {code for code in (low - 1, low, high, high + 1, signals.code_max + 1, 65535) if code >= 0} <= tried
+        ends = {(row[1], row[2]) for row in rows}
+        assert {(a, b) for a in (low_a, high_a) for b in (low_b, high_b)} <= ends
 
 
 def test_more_vectors_begin_with_the_same_ones_and_have_sound_random_codes(firmwares):
@@ -135,7 +141,7 @@ def read_by_the_page(tmp_path, firmware, sign) -> tuple[int, str]:
 
 
 @needs_compiler
-@pytest.mark.parametrize(("name", "sign"), [(DEFAULT, 1), (FULL_SET, 1), (FULL_SET, -1), (ONE_TABLE, 1)])
+@pytest.mark.parametrize(("name", "sign"), [(DEFAULT, 1), (FULL_SET, 1), (FULL_SET, -1), (ONE_TABLE, 1), (THREE, -1)])
 def test_the_compiled_core_gives_every_vector(name, sign, firmwares, tmp_path):
     status, said = read_by_the_page(tmp_path, firmwares[name], sign)
     assert (status, said) == (0, f"{firmwares[name].manifest.vectors} vectors, 0 wrong\n")

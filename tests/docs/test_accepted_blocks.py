@@ -6,7 +6,7 @@ import re
 
 from dzdesign.codegen.calibration import acceptance
 from dzdesign.codegen.calibration.files import block_core_files
-from dzdesign.codegen.calibration.layout import CalibrationBlock, CurrentBlock, SideBlock
+from dzdesign.codegen.calibration.layout import CalibrationBlock, CurrentBlock, SensorBlock, SideBlock
 from tests.codegen.calibration.test_check import with_current
 from tests.support.core_texts import texts
 from tests.support.core_variants import variant
@@ -30,7 +30,7 @@ def test_the_page_has_every_rule_and_no_other():
             found |= {name.value} if isinstance(name, ast.Constant) else set()
     rows = [line.split(" | ")[0][2:] for line in PAGE.splitlines() if line.startswith("| ")]
     stated = {name for row in rows for name in row.split(", ")} - {"rule"}
-    codes = {"codes of command", "codes of a", "codes of b"}
+    codes = {"codes of command", "codes of A", "codes of B", "codes of C"}
     assert stated == found - OF_SENTENCES | codes
 
 
@@ -44,9 +44,10 @@ def test_every_name_on_the_page_is_of_the_code():
     core = "\n".join(texts(block_core_files(built())).values())
     words = set(re.findall(r"\w+", core))
     assert not (missing := NAMED - words - {"design", "int"}), missing
-    fields = {name for kind in (CalibrationBlock, SideBlock, CurrentBlock) for name in kind.__dataclass_fields__}
-    not_read = fields - NAMED - {"sides", "current"}
-    for_display = {"a_full", "a_span_Pa", "b_full", "b_span_Pa", "u_max_uV", "compensator_sha256", "serial", "record"}
+    kinds = (CalibrationBlock, SensorBlock, SideBlock, CurrentBlock)
+    fields = {name for kind in kinds for name in kind.__dataclass_fields__}
+    not_read = fields - NAMED - {"sides", "current", "sensors"}
+    for_display = {"full", "span_Pa", "u_max_uV", "compensator_sha256", "serial", "record"}
     assert not_read == for_display | {"open_compare"}  # of which any number will do
 
 

@@ -20,13 +20,13 @@ from tests.support.synthetic import needs_compiler
 
 pytestmark = needs_compiler
 LAW, DRIVE = "dz_comp.c.jinja", "dz_drive.c.jinja"
-#: B minus A, in codes of sensor A.
-DIFFERENCE = "((p_b_adc * block->weight_b + block->balance - (uint32_t)p_a_adc * 4096u) >> 12)"
+#: B minus A, which is ahead at negative commands, in codes of it.
+DIFFERENCE = "((p_b_adc * 4096u - (uint32_t)p_a_adc * block->sides[1].weight - block->sides[1].balance) >> 12)"
 #: Template, what stands there, what somebody wrote instead, and the check that sees it.
 BUGS = {
     "wrong shift": (LAW, ">> (side->reciprocal_shift", ">> 1 >> (side->reciprocal_shift", "exact-law"),
-    "swapped channels": (LAW, "{{ side.turn }}pressure_difference(block, p_a_adc, p_b_adc)",
-                         "{{ side.turn }}pressure_difference(block, p_b_adc, p_a_adc)", "exact-law"),
+    "swapped channels": (LAW, "pressure_difference(side, {{ side.ahead.code }}, {{ side.behind.code }})",
+                         "pressure_difference(side, {{ side.behind.code }}, {{ side.ahead.code }})", "exact-law"),
     "off by one in the table": (LAW, "node[1].law * past", "node[2].law * past", "exact-law"),
     "sign of the negative side": (
         LAW, "from_band = {{ side.from_band }}", "from_band = {{ sides[0].from_band }}", "exact-law",

@@ -211,8 +211,8 @@ def test_a_seeded_fault_is_found(name, folder):
 
 #: Of three pressures: what is remembered of the other side's.
 SEEDED_OF_THREE = {
-    "one memory for both sides": ("        own = 1u;\n", ""),
-    "the other side forgets its pressures": ("faulty_pressures[1u - own], others)", "faulty_pressures[1u - own], 0u)"),
+    "one memory for both sides": ("        own = 1u;\n        idle = 0u;\n", ""),
+    "the other side forgets its pressures": ("faulty_pressures[idle], others)", "faulty_pressures[idle], 0u)"),
     "the other side's pressures count at once": ("(void)held_pressures(", "held |= held_pressures("),
     "the latch of the other side is asked": (
         "latched(block, drive->faulty_pressures[own])", "latched(block, drive->faulty_pressures[0])"),

@@ -4,8 +4,9 @@ import random
 import re
 import shutil
 import subprocess
-from dataclasses import astuple
+from dataclasses import astuple, replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -20,9 +21,12 @@ from dzdesign.codegen.telemetry.frame import (
     beta_factor,
     crc_of,
 )
+from dzdesign.codegen.telemetry.recording import columns_of
 from dzdesign.core.errors import InputError
+from dzdesign.identify.reading.metering_edge import metering_edge
 from tests.support.attacked_firmware import edit
 from tests.support.c2000_devices import DRIVERS, MODELS, compiled, model_of, model_options, run, texts_of, write
+from tests.support.core_variants import variant
 from tests.support.synthetic import needs_compiler
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wpedantic", "-Werror")
@@ -66,7 +70,7 @@ def random_frames(count: int, seed: int = 7) -> list[Frame]:
     return [Frame(ticks=rng.randrange(2**32), **{name: rng.randrange(2**16) for name in NAMES}) for _ in range(count)]
 
 
-NAMES = ("origin", "u_adc", "p_a_adc", "p_b_adc", "beta", "compare_a", "compare_b", "status")
+NAMES = ("origin", "u_adc", "p_a_adc", "p_b_adc", "p_c_adc", "beta", "compare_a", "compare_b", "status")
 
 
 def read(octets: bytes) -> tuple[list[Frame], FrameReader]:
@@ -77,6 +81,15 @@ def read(octets: bytes) -> tuple[list[Frame], FrameReader]:
 def test_the_crc_is_the_catalogued_one():
     """CRC-16/IBM-3740 has the check value 29B1h."""
     assert crc_of(b"123456789") == 0x29B1
+
+
+@pytest.mark.parametrize("pair", ["AC", "CB", "BC", "CA"])
+def test_a_recording_of_three_pressures_names_the_ports_of_both_edges(pair):
+    signals = replace(variant("three pressures").signals, negative_pair=pair)
+    ports = [name.partition("_")[0] for name in columns_of(SimpleNamespace(signals=signals))[2:5]]
+    edge, inputs = metering_edge(ports), dict(zip("ABC", ports, strict=True))
+    assert edge.positive == (inputs["A"], inputs["B"])
+    assert edge.negative == tuple(inputs[name] for name in pair)
 
 
 @needs_compiler

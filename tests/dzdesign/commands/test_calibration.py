@@ -123,7 +123,7 @@ def test_another_compensator_and_a_changed_number_are_found(written, tmp_path, b
     assert "IS NOT THE BLOCK" in capsys.readouterr().out
     # A number changed on the way, and the CRC made right: what the SHA-256 alone would not show.
     wrong = bytearray(block)
-    wrong[2 * 72] ^= 1
+    wrong[2 * 82] ^= 1
     (tmp_path / "valve.bin").write_bytes(wrong[:-4] + zlib.crc32(wrong[:-4]).to_bytes(4, "little"))
     words = ["calibration", "--read", str(tmp_path / "valve.bin"), str(written / "compensator.json"), "--json"]
     assert main(words) == 1

@@ -22,10 +22,11 @@ static void put(const uint16_t *octets, unsigned count)
 
 static int frame_of(const char *text, uint16_t *octets)
 {
-    unsigned n[9];
+    unsigned n[10];
     struct dz_frame frame;
 
-    if (sscanf(text, "%u %u %u %u %u %u %u %u %u", n, n + 1, n + 2, n + 3, n + 4, n + 5, n + 6, n + 7, n + 8) != 9)
+    if (sscanf(text, "%u %u %u %u %u %u %u %u %u %u", n, n + 1, n + 2, n + 3, n + 4, n + 5, n + 6, n + 7, n + 8, n + 9)
+        != 10)
     {
         return 0;
     }
@@ -34,10 +35,11 @@ static int frame_of(const char *text, uint16_t *octets)
     frame.u_adc = (uint16_t)n[2];
     frame.p_a_adc = (uint16_t)n[3];
     frame.p_b_adc = (uint16_t)n[4];
-    frame.beta = (uint16_t)n[5];
-    frame.compare_a = (uint16_t)n[6];
-    frame.compare_b = (uint16_t)n[7];
-    frame.status = (uint16_t)n[8];
+    frame.p_c_adc = (uint16_t)n[5];
+    frame.beta = (uint16_t)n[6];
+    frame.compare_a = (uint16_t)n[7];
+    frame.compare_b = (uint16_t)n[8];
+    frame.status = (uint16_t)n[9];
     dz_frame_pack(&frame, octets);
     return 1;
 }

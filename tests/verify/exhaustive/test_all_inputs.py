@@ -217,14 +217,15 @@ def test_the_pairs_of_a_difference_are_those_that_make_it(full, sign):
     exact = exact_law(full, sign)
     codes = np.arange(exact.code_max + 1)
     made = exact.difference(codes[:, None], codes[None, :])
-    sound_a, sound_b = ((codes >= low) & (codes <= high) for low, high in (exact.a.valid_codes, exact.b.valid_codes))
-    sound = sound_a[:, None] & sound_b[None, :]
+    valid = (exact.ahead.valid_codes, exact.behind.valid_codes)
+    sound_ahead, sound_behind = ((codes >= low) & (codes <= high) for low, high in valid)
+    sound = sound_ahead[:, None] & sound_behind[None, :]
     found = differences(exact)
     counts = np.bincount(made[sound] - found.values[0], minlength=found.values.size)
     assert (counts == np.maximum(found.b_last - found.b_first + 1, 0)).all() and found.pairs == sound.sum()
     for place in np.flatnonzero(found.made)[::97]:
         b = np.arange(found.b_first[place], found.b_last[place] + 1)
-        a = exact.turn * found.values[place] + found.slant[b]
+        a = found.values[place] + found.slant[b]
         assert (made[a, b] == found.values[place]).all() and sound[a, b].all()
 
 
@@ -234,13 +235,14 @@ def test_the_pressure_drops_of_a_difference_are_the_extremes_over_its_pairs(full
     found = differences(exact)
     found_drops = pressure_drops(exact, found, [Fraction(1, 7)])
     scale, least, most = found_drops.scale, found_drops.least, found_drops.most
-    a_MPa, b_MPa = (float(s.span_MPa) / (s.full_code - s.zero_code) for s in (exact.a, exact.b))
-    errors = [[float(error) for error in s.error_MPa] for s in (exact.a, exact.b)]
-    ends = sorted(exact.turn * error for error in (errors[0][0] - errors[1][1], errors[0][1] - errors[1][0]))
+    sensors = (exact.ahead, exact.behind)
+    a_MPa, b_MPa = (float(s.span_MPa) / (s.full_code - s.zero_code) for s in sensors)
+    errors = [[float(error) for error in s.error_MPa] for s in sensors]
+    ends = (errors[0][0] - errors[1][1], errors[0][1] - errors[1][0])
     for place in np.flatnonzero(found.made)[::61]:
         b = np.arange(found.b_first[place], found.b_last[place] + 1)
-        a = exact.turn * found.values[place] + found.slant[b]
-        drops = exact.turn * ((a - exact.a.zero_code) * a_MPa - (b - exact.b.zero_code) * b_MPa)
+        a = found.values[place] + found.slant[b]
+        drops = (a - exact.ahead.zero_code) * a_MPa - (b - exact.behind.zero_code) * b_MPa
         assert least[place] / scale == pytest.approx(drops.min() + ends[0], abs=1e-9)
         assert most[place] / scale == pytest.approx(drops.max() + ends[1], abs=1e-9)
 
@@ -280,8 +282,8 @@ def test_an_int_of_16_bits_is_seen_on_the_avr_alone(tmp_path):
     """A product that needs a longer int, which no PC shows."""
     folder = golden_folder("host", tmp_path / "fw")
     core = folder / "core" / "dz_comp.c"
-    text, count = re.subn(r"pressure_difference\(block, p_a_adc,",
-                          "pressure_difference(block, (uint16_t)(p_a_adc * 101 / 101),", core.read_text())  # fmt: skip
+    text, count = re.subn(r"pressure_difference\(side, p_a_adc,",
+                          "pressure_difference(side, (uint16_t)(p_a_adc * 101 / 101),", core.read_text())  # fmt: skip
     assert count >= 1
     core.write_text(text)
     host = check_all_inputs(folder)

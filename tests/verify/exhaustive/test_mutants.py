@@ -10,7 +10,7 @@ from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.errors import RequirementError
 from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
-from dzdesign.verify.exhaustive.drive_check import FIELDS, CompiledDrive, PreparedDrive
+from dzdesign.verify.exhaustive.drive_check import CompiledDrive, PreparedDrive
 from tests.support.core_mutants import (
     KILLED,
     REFUSED,
@@ -102,7 +102,8 @@ def test_a_fault_high_up_a_slow_ramp_is_seen(example_valve, tmp_path):
 def test_a_wrong_drive_is_named_by_field_and_sample(full):
     text = full.sources["dz_drive.c"].replace("command > leave)", "command >= leave)")
     found = full._drive.edited("dz_drive.c", text.encode()).check(full._drive_samples)
-    assert found.faults > 0 and found.first_wrong.split()[0] in FIELDS and "with codes" in found.first_wrong
+    assert found.faults > 0 and "with codes" in found.first_wrong
+    assert found.first_wrong.split()[0] in full._drive_samples.fields
     assert isinstance(full._drive, CompiledDrive)
     init = full.sources["dz_drive.c"].replace("drive->status = 0u;", "drive->status = 2u;")
     assert full._drive.edited("dz_drive.c", init.encode()).check(full._drive_samples).first_wrong == (

@@ -15,6 +15,8 @@ AB = DropColumns(quantities=("pA", "pB"), labels=("Druck A", "Druck B"))
 DP = DropColumns(quantities=("dP",), labels=("dP",))
 P_A, P_B = (DropColumns(quantities=("pP", port), labels=("Druck P", f"Druck {port[1]}")) for port in ("pA", "pB"))
 
+B_T, A_T = (DropColumns(quantities=(port, "pT"), labels=(f"Druck {port[1]}", "Druck T")) for port in ("pB", "pA"))
+
 
 def declared(choice):
     """Return a compensator whose direction is declared, of a valve that says nothing of it."""
@@ -36,28 +38,42 @@ def recorded(*, sign, columns=(AB, AB)):
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-@pytest.mark.parametrize("choice", ["same", "swapped"])
+@pytest.mark.parametrize("choice", ["A-B", "B-A"])
 @pytest.mark.parametrize("columns", [AB, DP], ids=["two sensors", "signed dP"])
 def test_only_the_recorded_direction_is_read(sign, choice, columns):
     compensator = declared(choice)
     check = recorded_inputs_follow(compensator, recorded(sign=sign, columns=(columns,) * 2))
-    magnitude = choice == "swapped" and columns is DP and sign > 0
-    assert check.holds is ((choice == "swapped") == (sign < 0) or magnitude)
+    magnitude = choice == "B-A" and columns is DP and sign > 0
+    assert check.holds is ((choice == "B-A") == (sign < 0) or magnitude)
     assert ("taken as declared" in check.text) is magnitude
 
 
 def test_a_permanent_fault_is_said_of_its_recording(wording):
-    compensator = declared("same")
+    compensator = declared("A-B")
     check = recorded_inputs_follow(compensator, recorded(sign=-1))
     wording.of_test(check.text)
 
 
-@pytest.mark.parametrize("choice", ["same", "swapped"])
+@pytest.mark.parametrize("choice", ["A-B", "B-A"])
 def test_three_sensors_are_no_pair(choice, wording):
     compensator = declared(choice)
     check = recorded_inputs_follow(compensator, recorded(sign=1, columns=(P_A, P_B)))
     assert check.holds is False
     wording("recorded inputs: three sensors", check.text)
+
+
+#: Ports of both sides' edges, and the inputs that read them at negative commands.
+THREE_PORTS = {"A-C": (P_A, P_B), "C-B": (B_T, A_T), "B-C": (P_A, A_T), "C-A": (B_T, P_B)}
+
+
+@pytest.mark.parametrize("recorded_as", THREE_PORTS)
+@pytest.mark.parametrize("choice", THREE_PORTS)
+def test_of_three_inputs_those_of_the_recorded_edge_are_read_and_no_others(choice, recorded_as):
+    check = recorded_inputs_follow(declared(choice), recorded(sign=1, columns=THREE_PORTS[recorded_as]))
+    assert check.holds is (choice == recorded_as)
+    if check.holds:
+        ahead, behind = choice.split("-")
+        assert f"and {ahead} minus {behind} {THREE_PORTS[choice][1].in_words()}" in check.text
 
 
 def test_switched_inputs_are_the_machine_s(wording):

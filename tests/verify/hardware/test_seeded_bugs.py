@@ -3,6 +3,8 @@
 The text is not compared: a folder would be what is generated, had the bug been in a template.
 """
 
+from dataclasses import replace
+
 import pytest
 
 from dzdesign.codegen.project import generate, target_named
@@ -11,7 +13,7 @@ from dzdesign.design.signals import Signals
 from dzdesign.verify.hardware.board_values import Board, read_board_values
 from dzdesign.verify.hardware.checks import hardware_checks
 from dzdesign.verify.hardware.model import Bench
-from tests.support.core_variants import BOTH
+from tests.support.core_variants import BOTH, variant
 from tests.support.example_coil import SENSORS, two_with_current, with_current
 from tests.support.golden_firmware import FULL, full_options, golden_compensator, golden_valve, write
 from tests.support.synthetic import needs_compiler
@@ -20,6 +22,7 @@ pytestmark = needs_compiler
 ONE, TWO, (CURRENT, SUPPLY) = "one solenoid", "two solenoids", SENSORS
 #: Current control of two solenoids.
 SHARED, EACH = "one shunt", "two shunts"
+THREE = "three pressures"
 HARDWARE, MAIN, ISR = "dz_hardware.c", "main.c", "dz_isr.c"
 
 
@@ -30,6 +33,11 @@ def compensator_of(target, form):
         return design(golden_valve(FULL), full_options(signals=signals, negative_dp="wired"))
     if form in (SHARED, EACH):
         return two_with_current(target, shunts=1 + (form == EACH))
+    if form == THREE:
+        signals = replace(variant("three pressures").signals, compare_max=target_named(target).compare_max)
+        sides = {name: replace(side, recorded_drop=None) for name, side in golden_valve(FULL).sides.items()}
+        options = full_options(signals=signals, accept=("broken-sensor",))
+        return design(replace(golden_valve(FULL), sides=sides), options)
     made = golden_compensator(target)
     return made if form == ONE else with_current(made, target_named(target), SENSORS[form])
 
@@ -56,6 +64,12 @@ EXCHANGED = """control_current();
 #: Form, file, what stands there, what somebody wrote instead, and the requirement that names it.
 BUGS = {
     "f28335": {
+        "third pressure on B's channel": (THREE, HARDWARE, "CONV04 = DZ_BOARD_PRESSURE_C",
+                                          "CONV04 = DZ_BOARD_PRESSURE_B", "channels"),
+        "the other side's pressure": (THREE, ISR, "p_c_adc = codes[DZ_SAMPLE_CODES - 1u]", "p_c_adc = codes[2]",
+                                      "channels"),
+        "B and C exchanged": (THREE, ISR, "state.p_b_adc, state.p_c_adc)",
+                              "state.p_c_adc, state.p_b_adc)", "channels"),
         "pressures swapped": (ONE, HARDWARE, "codes[1] = AdcMirror.ADCRESULT2", "codes[1] = AdcMirror.ADCRESULT3",
                               "channels"),
         "left-justified result": (ONE, HARDWARE, "AdcMirror.", "AdcRegs.", "channels"),
@@ -110,6 +124,10 @@ BUGS = {
                                     "    if (0) DZ_PWM_A.TZSEL.bit.DZ_OVER", "trip"),
     },
     "f280049c": {
+        "third pressure on B's channel": (THREE, HARDWARE, "DZ_CHANNEL(DZ_BOARD_PRESSURE_C)",
+                                          "DZ_CHANNEL(DZ_BOARD_PRESSURE_B)", "channels"),
+        "B and C exchanged": (THREE, ISR, "state.p_b_adc, state.p_c_adc)",
+                              "state.p_c_adc, state.p_b_adc)", "channels"),
         "pressures swapped": (ONE, HARDWARE, "codes[1] = ADC_readResult(ADCARESULT_BASE, ADC_SOC_NUMBER2)",
                               "codes[1] = ADC_readResult(ADCARESULT_BASE, ADC_SOC_NUMBER3)", "channels"),
         "converter not awaited": (ONE, HARDWARE, "DEVICE_DELAY_US(1000);", "", "channels"),

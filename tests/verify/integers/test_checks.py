@@ -185,7 +185,7 @@ def test_octave_that_hangs_is_ended_and_runs_nothing_of_the_users(tmp_path, monk
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.setattr(texts, "TIMEOUT_S", 1.5)
     with running(OCTAVE, "waits", b"function [c, s, t] = waits(u, a, b)\n  pause(60);\nend\n") as function:
-        codes = {name: np.zeros(3) for name in texts.INPUTS}
+        codes = {name: np.zeros(3) for name in ("command", "pressure_a", "pressure_b")}
         with pytest.raises(RequirementError, match="did not end"):
             function(codes)
 

@@ -8,6 +8,7 @@ folds into the code.
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from fractions import Fraction
+from textwrap import wrap
 
 from dzdesign.codegen.calibration.acceptance import LARGEST_CODES, NAMED, OF_CURRENT, largest_node
 from dzdesign.codegen.calibration.block import built_for, numbers_of
@@ -36,6 +37,7 @@ from dzdesign.codegen.core.certificate_text import (
     zero_command,
 )
 from dzdesign.codegen.core.constants import (
+    COLUMNS,
     LITERALS,
     OF_B,
     Define,
@@ -53,6 +55,7 @@ from dzdesign.derivation.law import law
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.current.circuit import CORRECTION_SHIFT
 from dzdesign.design.drive_functions import RAMP_UNIT
+from dzdesign.design.pressure_inputs import what_machine_switches
 from dzdesign.design.signals import INPUT_NAMES, WEIGHT_SHIFT
 
 #: Bits of what dz_calibration_check() finds wrong.
@@ -177,6 +180,7 @@ def _valve_header(page: ValvePage) -> Values:
             }
             for sign in c.signals.signs
         ],
+        "switched": wrap(what_machine_switches(c), COLUMNS - 3),
         "lines": page.lines(),
     }
 

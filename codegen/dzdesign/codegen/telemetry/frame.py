@@ -48,7 +48,7 @@ class Frame:
     u_adc: Annotated[int, Number(bits=16, text="code of the command")]
     p_a_adc: Annotated[int, Number(bits=16, text="code of pressure A")]
     p_b_adc: Annotated[int, Number(bits=16, text="code of pressure B")]
-    p_c_adc: Annotated[int, Number(bits=16, text="code of pressure C; 0 without one")]
+    p_c_adc: Annotated[int, Number(bits=16, text="code of pressure C; 0 without one")] = 0
     beta: Annotated[int, Number(bits=16, text="beta(dP) times 2^15, rounded down")]
     compare_a: Annotated[int, Number(bits=16, text="PWM compare value of solenoid A")]
     compare_b: Annotated[int, Number(bits=16, text="of solenoid B; one of the two is 0")]

@@ -119,13 +119,14 @@ def _wired(compensator: Compensator, readings: Sequence[_Reading]) -> dict[str, 
 def _misread(exact: ExactLaw, reading: _Reading, names: Sequence[str], units: RecordedUnits) -> str:
     """Say that the law does not read the recorded pressure drop, within a code; nothing where it does.
 
-    The lower pressure is none, as the firmware takes their difference alone.
+    The lower pressure is none, as the firmware takes their difference alone; what another input reads is half its span.
     """
     sensors = exact.compensator.signals.pressures
-    higher = names[0] if reading.drop_MPa > 0 else names[1]
+    higher, lower = names if reading.drop_MPa > 0 else names[::-1]
     away = round(abs(reading.drop_MPa) / float(sensors[higher].per_code_MPa))
-    codes = {name: sensor.zero_code for name, sensor in sensors.items()}
-    codes[higher] = min(codes[higher] + away, sensors[higher].valid_codes[1])
+    codes = {name: (sensor.zero_code + sensor.full_code) // 2 for name, sensor in sensors.items()}
+    codes[lower] = sensors[lower].zero_code
+    codes[higher] = min(sensors[higher].zero_code + away, sensors[higher].valid_codes[1])
     drop_MPa = (codes[higher] - sensors[higher].zero_code) * sensors[higher].per_code_MPa
     ahead, behind = (codes[name] for name in exact.pair)
     status = exact.answer(exact.zero, ahead, behind).status & PRESSURE_BITS
