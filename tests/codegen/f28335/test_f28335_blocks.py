@@ -302,7 +302,7 @@ def test_telemetry_that_comes_back_between_requests_spoils_no_load(start):
     """As from a line that echoes, or a monitor that sends what it read: frames, their beginnings, and zeros."""
     device = start()
     at_command(device, ZERO)
-    frame = bytes.fromhex("a55a02") + bytes(range(FRAME_OCTETS - 3))
+    frame = bytes.fromhex("a55a03") + bytes(range(FRAME_OCTETS - 3))
     for noise in (frame, frame[:7], b"\xc3", b"\xc3\x3c\x01\x05\xff", bytes(40)):
         line = Eventful(device, "", 0, noise)
         list(LoadSession(line).loading(blocks()[2], crc_of_block(blocks()[2]), origin_of_block(blocks()[2])))

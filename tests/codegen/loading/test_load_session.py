@@ -64,7 +64,7 @@ def test_what_is_no_reply_to_the_request_is_passed_over():
     rng = random.Random(2)
 
     def answer(frame, count):
-        telemetry = bytes.fromhex("a55a02") + rng.randbytes(TELEMETRY_OCTETS - 3)
+        telemetry = bytes.fromhex("a55a03") + rng.randbytes(TELEMETRY_OCTETS - 3)
         stale = reply(frame, Reason.STORE, sequence=(frame.sequence - 1) % 256)
         other = reply(frame, Reason.STORE, type=Request.ABORT | REPLY)
         damaged = bytearray(reply(frame, Reason.STORE))

@@ -113,7 +113,7 @@ def test_frames_are_found_between_garbage_cuts_and_errors_in_pieces_of_any_size(
         if kind == 1:
             lines.append("raw " + rng.randbytes(rng.randrange(1, 40)).hex())
         if kind == 2:
-            lines.append("raw a5a55aa55a" + rng.choice(["", "02", "0214", "0114"]))
+            lines.append("raw a5a55aa55a" + rng.choice(["", "03", "0316", "0114"]))
         lines.append({4: f"cut {rng.randrange(1, FRAME_OCTETS)} ", 5: f"flip {rng.randrange(2, FRAME_OCTETS)} "}
                      .get(kind, "frame ") + numbers(frame))  # fmt: skip
         good += [frame] if kind < 4 else []

@@ -166,7 +166,7 @@ def test_garbage_cut_frames_and_bad_crcs_are_passed_over_and_counted(bench):
     lines[10] = lines[10].replace("frame", "cut 11")
     lines[20] = lines[20].replace("frame", "flip 13")
     lines[21] = lines[21].replace("frame", "flip 23")
-    lines[30] = "raw " + "a55a0214" + "5a" * 9
+    lines[30] = "raw " + "a55a0316" + "5a" * 9
     lines[40] = "raw " + random.Random(1).randbytes(100).replace(b"\xa5", b"\0").hex()
     bench.listen()
     bench.send(lines)

@@ -74,10 +74,11 @@ def test_in_units_of_a_plc_the_law_is_that_of_the_share_of_full_command():
     assert exact.betas_at(-exact.reverse - 1) == exact.least_betas()
 
 
-@pytest.fixture(scope="module", params=ROOTS)
+@pytest.fixture(scope="module", params=(*ROOTS, "three"))
 def plc(request):
     """The text of a block in units of a PLC, and what tries it."""
-    made = golden_compensator(root=ROOTS[request.param])
+    three = request.param == "three"
+    made = variant("three pressures") if three else golden_compensator(root=ROOTS[request.param])
     return structured_text(made, "0" * 64, "plc"), EveryPair(made, "plc", made.signals.signs, remembers=True)
 
 
@@ -99,7 +100,11 @@ of_one = pytest.mark.parametrize("plc", ["one"], indirect=True)
         ("two", "SEL(away > LEAVE_ZERO, SEL(away < -LEAVE_ZERO, side, -1), 1)",
          "SEL(away > 0, SEL(away < 0, side, -1), 1)", COUNTS),
         ("two", "SEL(valid, 0, SEL(away", "SEL(valid, side, SEL(away", COUNTS),
-        ("two", "SEL(negative, difference, -difference)", "difference", COUNTS),
+        ("two", "pressure_ahead - pressure_behind", "pressure_behind - pressure_ahead", COUNTS),
+        # Pressures of the other side.
+        ("three", "failure_behind := SEL(negative, b_failed, c_failed)", "failure_behind := b_failed", COUNTS),
+        ("three", "MAX(pressure_c,", "MAX(pressure_b,", COUNTS),
+        ("three", "BOOL_TO_DINT(c_failed) * 512", "BOOL_TO_DINT(b_failed) * 512", ["wrong_status"]),
         ("two", "output_b := SEL(negative, 0, drive)", "output_b := SEL(negative, 0, output_a)", COUNTS),
         ("two", "negative := side < 0", "negative := away < 0", COUNTS),
     ],

@@ -144,12 +144,12 @@ class _Law:
     def _of_driven(self, each: Mapping[str, Node], negative: Node | None, what: str) -> list[Node]:
         """Return what belongs to the inputs ahead and behind: of the driven side, where the two sides' differ."""
         found = []
-        for place, end in enumerate(("ahead", "behind")):
+        for place, (end, where) in enumerate({"ahead": "ahead of", "behind": "behind"}.items()):
             names = list(dict.fromkeys(self.sides[sign].pair[place] for sign in self.signs))
             node = each[names[0]]
             if negative is not None and len(names) > 1:
                 chosen = negative.choose(each[names[1]], node)
-                node = self.form.let(f"{what}_{end}", chosen, f"{end} the edge of the driven side")
+                node = self.form.let(f"{what}_{end}", chosen, f"{where} the edge of the driven side")
             found.append(node)
         return found
 

@@ -41,6 +41,7 @@ SCALARS = (
     "places", "stride", "cube", "impatient", "laws_at", "rows_at", "directions_at", "slant_at", "pairs_at",
     "places_at", "betas_at", "tested_to", "dither_counts", "dither_ticks", "both", "leave_zero", "ramp_unit",
     "failed_status", "ahead_input", "behind_input", "other_input", "ahead_bit", "behind_bit", "other_bit",
+    "unused",
 )  # fmt: skip
 PLAN = np.dtype([("denominator", "<i8", PARTS), ("part_end", "<i4", PARTS), *((name, "<i4") for name in SCALARS)])
 PART = np.dtype([("remainder", "<i8"), ("carry", "<i8"), ("quotient", "<i4"), ("step", "<i4")])

@@ -42,7 +42,7 @@ struct dz_plan {
      * difference that can't be right. */
     int32_t dither_counts, dither_ticks, both, leave_zero, ramp_unit, failed_status;
     /* Which input each pressure is, 0 for A, and its bit of the status; the other one is no pressure of this side. */
-    int32_t ahead_input, behind_input, other_input, ahead_bit, behind_bit, other_bit;
+    int32_t ahead_input, behind_input, other_input, ahead_bit, behind_bit, other_bit, unused;
 };
 
 /* A part of the law, straight in the command: counts (and a half) at its first place, and what a place adds. */
