@@ -281,7 +281,7 @@ class DesignChoices:
     """Signal of the third sensor, which only negative commands use (default: as upstream)."""
     negative_dp: Annotated[Text, Option("D", CONNECTIONS, "recorded", choices=NEGATIVE_DP)] = None
     """Pressure drop at negative commands, of two pressure inputs, such as A-C for A minus C; C is a third input.
-    recorded: as the recordings show it, and A-B, as at positive commands, if they do not. wired: the machine switches
+    recorded: as the recordings show it, and A-B if they do not, as at positive commands. wired: the machine switches
     the inputs, so that A minus B is the metering drop at both signs."""
     crystal: Annotated[Text, Option("F", BOARD, example="30 MHz", read=_crystal)] = None
     """Frequency of the board's crystal or oscillator, for target f28335 (default: 30 MHz). Processor and PWM get the

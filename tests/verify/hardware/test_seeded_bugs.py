@@ -132,9 +132,9 @@ BUGS = {
         "block taken under command": (BLOCK, "dz_active.c", "return reason;", "return 0u * reason;", "telemetry"),
         "erased while driven": (BLOCK, "dz_active.c", "(hold != 0u) && (dz_state.held != 0u)", "hold != 0u",
                                  "telemetry"),
-        "loaded while driven": (BLOCK, ISR, "        force_output_low();\n        dz_state.held = 1u;",
-                                "        if (dz_state.fault != 0u)\n            force_output_low();\n"
-                                "        dz_state.held = 1u;", "telemetry"),
+        "loaded while driven": (BLOCK, ISR, "        force_output_low();\n        state.held = 1u;",
+                                "        if (state.fault != 0u)\n            force_output_low();\n"
+                                "        state.held = 1u;", "telemetry"),
         "flash not defined": (ONE, PROJECT_FILE, "--define=_FLASH", "", "compiles"),
         "flash defined by no project": (ONE, PROJECTS, "--define=_FLASH", "", "rates"),
         "both solenoids": (TWO, HARDWARE, "DZ_PWM_B.CMPA.half.CMPA = compare;\n    DZ_PWM_B.AQCSFRC",
