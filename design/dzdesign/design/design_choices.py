@@ -279,9 +279,9 @@ class DesignChoices:
     pressure_c: Annotated[Text, Option("S", CONNECTIONS, example="4..20 mA on 140 ohm")] = None
     """Signal of the third sensor, which only negative commands use (default: as upstream)."""
     negative_dp: Annotated[Text, Option("D", CONNECTIONS, "recorded", choices=NEGATIVE_DP)] = None
-    """Pressure drop at negative commands. recorded: as the recordings show it, and A-B, as at positive commands, if they
-    do not. wired: the machine switches the inputs, so that A minus B is the metering drop at both signs. A-C is A minus
-    C, where C is a third input."""
+    """Pressure drop at negative commands. recorded: as the recordings show it, and A-B, as at positive commands, if
+    they do not. wired: the machine switches the inputs, so that A minus B is the metering drop at both signs. A-C is A
+    minus C, where C is a third input."""
     crystal: Annotated[Text, Option("F", BOARD, example="30 MHz", read=_crystal)] = None
     """Frequency of the board's crystal or oscillator, for target f28335 (default: 30 MHz). Processor and PWM get the
     fastest clock that it allows. Target f280049c takes the clock of TI's device.h."""
