@@ -151,7 +151,7 @@ def _crystal(text: str, option: str) -> int:
 def _channels(text: str, option: str) -> tuple[str, ...]:
     """Read the names of the converter's channels: of command and pressures, then of current and supply."""
     names = tuple(text.upper().replace(",", " ").split())
-    if not 3 <= len(names) <= 7 or len(set(names)) < len(names) or not all(map(CHANNEL.fullmatch, names)):
+    if not 3 <= len(names) <= 6 or len(set(names)) < len(names) or not all(map(CHANNEL.fullmatch, names)):
         raise InputError(
             f"{option} is {quoted(text)}, expected the channels of command, pressure A and pressure B (then of "
             "pressure C, the current and the supply, where they are read), each once, such as 'A0 A1 A2'"
@@ -187,7 +187,7 @@ class DesignChoices:
 
     drive: Annotated[Text, Option("D", DRIVE, "duty", choices=DRIVES)] = None
     """Output of the law. duty: the PWM's share of the supply voltage. current: the set point of a current loop in the
-    firmware, with the rated current as full drive."""
+    firmware, for one solenoid, with the rated current as full drive."""
     coil: Annotated[Text, Option("C", DRIVE, example="3.5 ohm 40 mH", read=_coil)] = None
     """Coil for --drive current, such as "3.5 ohm 40 mH". The form "3.5 + 0.5 ohm x 0.75..1.35, 40 mH x 0.5..1.5" adds
     the resistance of switch and shunt and the ranges, here with their defaults."""
@@ -195,8 +195,7 @@ class DesignChoices:
     """Current at full drive, for --drive current."""
     current_signal: Annotated[Text, Option("S", DRIVE, example="0..1.2 A on 2 ohm + 0.15 V")] = None
     """Signal of the current sensor at the converter, for --drive current, such as "0..1.2 A on 2 ohm + 0.15 V". The
-    resistance is that of the shunt times its amplifier's gain, and the voltage is the one without current. With two
-    solenoids it is of one shunt for both, or with "each" behind it of one shunt for each."""
+    resistance is that of the shunt times its amplifier's gain, and the voltage is the one without current."""
     supply_signal: Annotated[Text, Option("S", DRIVE, example="0..36 V x 0.075")] = None
     """Signal of the supply voltage at the converter, for --drive current, such as "0..36 V x 0.075" (default: not
     measured). Measuring it makes the current loop faster."""
@@ -264,8 +263,8 @@ class DesignChoices:
     close above its opening threshold. broken-sensor: a failure of a pressure signal raises the offset undetected."""
     command_signal: Annotated[Text, Option("S", CONNECTIONS, example="0..10 V x 0.3")] = None
     """Signal of the command at the converter: range, shunt, attenuator, offset and represented command (default: 0 to
-    10 V over the converter's whole range; of a valve with both sides -10 to 10 V about its middle). Examples with both
-    signs are "-10..10 V x 0.12 + 1.5 V" and "4..20 mA on 150 ohm = -10..10 V"."""
+    10 V over the converter's whole range). Examples with both signs are "-10..10 V x 0.12 + 1.5 V" and "4..20 mA on 150
+    ohm = -10..10 V"."""
     polarity: Annotated[Text, Option("P", CONNECTIONS, "normal", choices=POLARITIES)] = None
     """Polarity of the command. normal: more signal is more command. inverted: more signal is less command."""
     pressure_span: Annotated[Text, Option("P", CONNECTIONS, "20 MPa", example="20 MPa", read=quantity("pressure"))] = (
@@ -280,16 +279,16 @@ class DesignChoices:
     pressure_c: Annotated[Text, Option("S", CONNECTIONS, example="4..20 mA on 140 ohm")] = None
     """Signal of the third sensor, which only negative commands use (default: as upstream)."""
     negative_dp: Annotated[Text, Option("D", CONNECTIONS, "recorded", choices=NEGATIVE_DP)] = None
-    """Pressure drop at negative commands, of two pressure inputs, such as A-C for A minus C; C is a third input.
-    recorded: as the recordings show it, and A-B if they do not, as at positive commands. wired: the machine switches
-    the inputs, so that A minus B is the metering drop at both signs."""
+    """Pressure drop at negative commands. recorded: as the recordings show it, and A-B, as at positive commands, if
+    they do not. wired: the machine switches the inputs, so that A minus B is the metering drop at both signs. A-C is A
+    minus C, where C is a third input."""
     crystal: Annotated[Text, Option("F", BOARD, example="30 MHz", read=_crystal)] = None
     """Frequency of the board's crystal or oscillator, for target f28335 (default: 30 MHz). Processor and PWM get the
     fastest clock that it allows. Target f280049c takes the clock of TI's device.h."""
     channels: Annotated[Text, Option("C", BOARD, example="A0 A1 A2", read=_channels)] = None
     """Channels of the converter for command, pressure A and pressure B, of the targets f28335 and f280049c (default:
-    "A0 A1 A2"). That of a third pressure follows (default: "A6"), then with --drive current those of the current, of
-    two shunts one each (default: "A3", and "A5" of the second), and of a measured supply (default: "A4")."""
+    "A0 A1 A2"). That of a third pressure follows (default: "A6"), then with --drive current those of the current and of
+    a measured supply (default: "A3 A4")."""
     ramp_up: Annotated[Text, Option("T", DRIVE, "0 s", example="0.5 s", read=_times)] = None
     """Time from zero to full command, such as "0.5 s", or "0.5 s / 0.8 s" for positive and negative commands."""
     ramp_down: Annotated[Text, Option("T", DRIVE, "0 s", example="0.5 s", read=_times)] = None
