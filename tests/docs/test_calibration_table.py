@@ -41,6 +41,8 @@ def test_a_block_is_read_by_the_table_alone():
                 for at in range(begin, begin + bits // 8 * count, bits // 8)
             ]
             of = block.sides[side] if of_side else block.current if name.startswith("current.") else block
+            if sensor := re.match(r"sensors\[(\d)\]\.", name):
+                of = block.sensors[int(sensor[1])]
             value = getattr(of, name.rpartition(".")[2])
             assert name == "crc32" or found == list(value if isinstance(value, tuple) else (value,)), name
             covered += bits // 8 * count

@@ -13,18 +13,18 @@ from tests.support.paths import ROOT
 ROOM_SIZES = {
     "core": (2510, 15, 0),
     "derivation": (4703, 28, 325),
-    "identify": (16150, 93, 1064),
+    "identify": (16161, 93, 1052),
     "assess": (1577, 8, 0),
-    "design": (6950, 31, 0),
-    "codegen": (7522, 50, 7609),
-    "verify": (11147, 61, 4241),
-    "report": (4416, 20, 532),
-    "dzdesign": (8729, 59, 161),
+    "design": (7190, 31, 0),
+    "codegen": (7791, 50, 7921),
+    "verify": (11847, 62, 4524),
+    "report": (4421, 20, 532),
+    "dzdesign": (9164, 62, 165),
 }
 #: Lines of Python of what is not shipped, and of the files that the tests compare with.
-TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 45082, 14444, 8534
+TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 45838, 14530, 8554
 #: Options of all commands together; an option of two commands counts twice.
-OPTIONS = 165
+OPTIONS = 169
 #: What a number may be above what is there, before it is to be lowered.
 SLACK = 0.02
 TEXTS = {".jinja", ".c", ".h", ".m", ".ld", ".toml", ".html", ".css", ".js", ".svg", ".md", ".txt"}
