@@ -55,18 +55,19 @@ def codegen(capsys, tmp_path):
 
 
 def test_the_default_design_does_not_go_over_a_bipolar_one(codegen, tmp_path):
-    """Seeded: a firmware for two solenoids, then of the same valve with no options into the same folder."""
+    """Seeded: a firmware for two solenoids, then of the same valve for one into the same folder."""
     status, said = codegen(BOTH_SIDES, *BIPOLAR)
     assert status == 0 and "left out" not in said
     before = contents(tmp_path / "firmware")
-    status, said = codegen(BOTH_SIDES)
+    one = ("--command-signal", "0..10 V x 0.3")
+    status, said = codegen(BOTH_SIDES, *one)
     assert status == 2 and contents(tmp_path / "firmware") == before
     assert "two solenoids, this one one solenoid" in said and "--command-signal '-10..10 V" in said
     assert "--replace" in said and "-o" in said
-    status, said = codegen(BOTH_SIDES, replace=["--replace"])
+    status, said = codegen(BOTH_SIDES, *one, replace=["--replace"])
     assert status == 0 and "warning: the valve's negative side is left out" in said
     assert "dz_comp_negative" not in (tmp_path / "firmware/core/dz_comp.h").read_text()
-    assert codegen(BOTH_SIDES)[0] == 0  # now it is the same design
+    assert codegen(BOTH_SIDES, *one)[0] == 0  # now it is the same design
 
 
 def test_another_option_is_named(valve_file, codegen, tmp_path):

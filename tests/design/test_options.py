@@ -132,7 +132,7 @@ def test_the_command_line_refuses_and_writes_nothing(example_valve, tmp_path, ca
     ):
         assert main(["design", str(path), *given, "-o", str(output)]) == 2
         assert words in capsys.readouterr().err and not output.exists()
-    assert main(["design", str(path), "--output-max", "90 %", "-o", str(output)]) == 0
+    assert main(["-v", "design", str(path), "--output-max", "90 %", "-o", str(output)]) == 0
     assert re.search(r"90\.00 from \d+\.\d % on", capsys.readouterr().out)
     path.write_text(path.read_text().replace('"schema":', '"schema": "dzdesign.valve/0",\n  "schema":', 1))
     assert main(["design", str(path), "-o", str(output)]) == 2

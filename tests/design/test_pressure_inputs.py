@@ -265,7 +265,10 @@ def test_a_third_sensor_has_a_signal_and_an_error_of_its_own(two_sides):
 
 
 @pytest.mark.parametrize("signal", [BOTH_SIGNS, "0..10 V x 0.3"])
-@pytest.mark.parametrize("given", [{"pressure_c": "4..20 mA on 140 ohm"}, {"pressure_error": "0.1 % / 0.1 % / 0.2 %"}])
+@pytest.mark.parametrize(
+    "given",
+    [{"pressure_c": "4..20 mA on 140 ohm"}, {"amplifier": "1 %", "pressure_error": "0.1 % / 0.1 % / 0.2 %"}],
+)
 def test_what_is_said_of_a_third_sensor_that_nothing_reads_is_refused(two_sides, signal, given, wording):
     with wording.refusal(InputError, "negative drop: a third sensor that nothing reads"):
         designed_as(two_sides, drop(*AB), drop(*AB), command_signal=signal, **given)

@@ -83,7 +83,7 @@ def test_offset_passes_no_more_than_a_declared_flow(valve, tmp_path):
 
 def test_measured_valve_without_pressure_is_one_pressure_and_says_so(tmp_path, capsys):
     path = tmp_path / "valve.json"
-    assert main(["identify", str(SHARED / "real" / "pvp_psol.csv"), "-o", str(path)]) == 0
+    assert main(["-v", "identify", str(SHARED / "real" / "pvp_psol.csv"), "-o", str(path)]) == 0
     bracket = json.loads((SHARED / "real" / "brackets.json").read_text())["pvp_psol.csv"]
     valve = json.loads(path.read_text())
     (test,) = valve["sides"]["positive"]["tests"]

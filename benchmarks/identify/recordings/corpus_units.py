@@ -251,7 +251,7 @@ def fault_of(case: Case, folder: Path) -> str:
     output.unlink(missing_ok=True)
     out, errors = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(errors):
-        status = main(["identify", *paths, *case.options, "-o", str(output)])
+        status = main(["-v", "identify", *paths, *case.options, "-o", str(output)])
     if case.asks:
         right = status == 2 and case.asks in errors.getvalue()
         return "" if right else f"misread: not asked for '{case.asks}': {errors.getvalue() or out.getvalue()}"

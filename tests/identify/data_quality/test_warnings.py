@@ -168,7 +168,7 @@ class TestBranchOrder:
         assert main(["design", "valve.json"]) == 2 and not (tmp_path / "compensator.json").exists()
         wording.of_test(capsys.readouterr().err)
         assert main(["design", "valve.json", "--accept", "branch-ordr"]) == 2
-        assert main(["design", "valve.json", "--accept", "branch-order"]) == 0
+        assert main(["-v", "design", "valve.json", "--accept", "branch-order"]) == 0
         assert "note: accepted, branch-order" in capsys.readouterr().out
         assert main(["design", "valve.json", "--config", "options.toml"]) == 0
 

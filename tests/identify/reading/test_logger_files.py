@@ -265,7 +265,7 @@ def test_stamps_count_from_the_first_row_of_the_file(here):
 
 def test_whole_numbers_without_a_unit_that_can_only_be_milliseconds(here, capsys):
     assert_is_the_ramp(read(milliseconds()))
-    assert main(["identify", "ramp.csv"]) == 0
+    assert main(["-v", "identify", "ramp.csv"]) == 0
     assert "warning [time-unit] ramp.csv: the time column holds whole numbers without a unit" in capsys.readouterr().out
     # As seconds these are ramps of 25 minutes: nothing is plain.
     few = milliseconds().split(b"\n")

@@ -46,7 +46,7 @@ def test_the_command_line_goes_before_the_file_entry_by_entry(here, capsys):
         '[record]\nserial = 4711\noil = "HLP 46, 40\u00a0°C"\nviscosity = 46.10\ndate = 2026-01-31\n'
     )
     words = ["--config", "dzdesign.toml", "--record", "serial = 0815", "--record", "bench=2 = west"]
-    assert main(["-q", "identify", "ramp.csv", *words]) == 0
+    assert main(["-v", "identify", "ramp.csv", *words]) == 0
     said = {"serial": "0815", "oil": "HLP 46, 40 °C", "viscosity": "46.10", "date": "2026-01-31", "bench": "2 = west"}
     found = json.loads(Path("valve.json").read_text())
     assert found["record"] == said and list(found["record"]) == list(said)

@@ -125,7 +125,7 @@ def edit(folder, name, old, new):
 
 def test_a_firmware_accepts_its_block_and_refuses_it_damaged(made):
     check = checked(made)
-    assert check.holds and "2660 octets" in check.text and f"{4 * (len(HEADER) + 1)} changed headers" in check.text
+    assert check.holds and "2680 octets" in check.text and f"{4 * (len(HEADER) + 1)} changed headers" in check.text
 
 
 def test_a_core_with_the_numbers_of_its_valve_has_no_block(made):
