@@ -62,7 +62,7 @@ class Example:
 
     def offset_V(self, dp_MPa: np.ndarray) -> np.ndarray:
         """Return the drive at zero command over the pressure drop, with its beta as the integers have it."""
-        codes = [int(self.compensator.signals.dp_code(Fraction(float(each)))) for each in dp_MPa]
+        codes = [int(self.compensator.signals.pair(1).dp_code(Fraction(float(each)))) for each in dp_MPa]
         return np.array([float(self.compensator.drive(0, code)) for code in codes]) * self.found.model.u_max_V
 
 

@@ -48,7 +48,7 @@ def residual(example: Example) -> "Figure":
     """Drive over command at 1 MPa: where it crosses both thresholds, and what is left of the dead zone."""
     figure, (axes,) = panels(3.8)
     test, compensator = example.side.tests[1], example.compensator
-    code = int(compensator.signals.dp_code(Fraction(test.dp_MPa)))
+    code = int(compensator.signals.pair(1).dp_code(Fraction(test.dp_MPa)))
     command = np.arange(0, 500)
     drive = 10 * np.array([float(compensator.drive(int(each), code)) for each in command])
     share = 100 * command / 4095
@@ -85,7 +85,7 @@ def transition(example: Example) -> "Figure":
         (example.without_transition, BLUE, "--", "--transition off"),
         (example.compensator, GREEN, "-", "with zero band and transition"),
     ):
-        code = int(compensator.signals.dp_code(Fraction(test.dp_MPa)))
+        code = int(compensator.signals.pair(1).dp_code(Fraction(test.dp_MPa)))
         drive = 10 * np.array([float(compensator.drive(int(each), code)) for each in command])
         axes.plot(100 * command / 4095, drive, line, color=colour, lw=2, label=name)
     for height, name in ((test.u_knee_rising_V, "valve opens"), (test.u_knee_falling_V, "valve closes")):
@@ -139,13 +139,13 @@ def every_input(example: Example) -> "Figure":
     """The compare value over all pairs of command and difference codes, a coarse grid of the exact law."""
     figure, (axes,) = panels(3.9)
     compensator = example.compensator
-    top, widest = compensator.signals.code_max, compensator.signals.largest_difference(1)
+    top, widest = compensator.signals.code_max, compensator.signals.pair(1).largest_difference
     commands = np.linspace(0, top, 41).astype(int)
     differences = np.linspace(-widest, widest, 64).astype(int)
     values = np.array([[compensator.compare(int(u), int(dp)) for u in commands] for dp in differences])
     drawn = axes.pcolormesh(commands, differences, values, cmap="cividis", shading="nearest", rasterized=True)
     figure.colorbar(drawn, label="compare value (60000: full output)")
-    tested = [int(compensator.signals.dp_code(Fraction(end))) for end in example.side.valid_dp_MPa]
+    tested = [int(compensator.signals.pair(1).dp_code(Fraction(end))) for end in example.side.valid_dp_MPa]
     for code in tested:
         axes.axhline(code, color="white", lw=1.2, ls="--")
     axes.axhline(-compensator.reverse_codes, color="white", lw=1.2, ls=":")
