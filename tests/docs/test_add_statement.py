@@ -1,4 +1,4 @@
-"""The page on adding a statement, followed to the letter in a copy of the room: it is proved, and a wrong one is not."""
+"""The page on adding a statement, followed to the letter in a copy of the room: it is proved; a wrong one is not."""
 
 import os
 import re
