@@ -23,7 +23,6 @@ from scipy.optimize import brentq
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs_at_tests import LawCorners, corners_of
 from dzdesign.design.design_choices import LOOP, position_loop
-from dzdesign.design.signals import SIDE_NAMES
 
 #: Commands from which the loop is let go, over full; and shares of the recorded hysteresis that small cycles may have.
 STARTS = np.array([0.01, 0.03, 0.1, 0.3, 1.0])
@@ -173,7 +172,7 @@ def largest_gains(compensator: Compensator, lag_s: float, delay_s: float) -> tup
     found = []
     for sign in compensator.signals.signs:
         loops = []
-        for test in compensator.valve.sides[SIDE_NAMES[sign]].tests:
+        for test in compensator.valve.side(sign).tests:
             opens, closes = test.u_knee_rising_V, test.u_knee_falling_V
             if opens is None and closes is None:
                 continue
@@ -187,7 +186,7 @@ def largest_gains(compensator: Compensator, lag_s: float, delay_s: float) -> tup
         if loops:
             _, dp_MPa, loop = max(loops, key=lambda each: each[0])
             gain, linear = largest_gain(loop), loop.linear_gain
-            found.append(LargestGain(side=SIDE_NAMES[sign], dp_MPa=dp_MPa, gain=gain, linear=linear))
+            found.append(LargestGain(side=compensator.valve.side_name(sign), dp_MPa=dp_MPa, gain=gain, linear=linear))
     return tuple(found)
 
 

@@ -72,7 +72,6 @@ def print_design(compensator: "Compensator") -> None:
     from dzdesign.design.position_loop import in_words
     from dzdesign.design.pressure_inputs import not_covered
     from dzdesign.design.redesign import hysteresis_choices, without_sensors
-    from dzdesign.design.signals import SIDE_NAMES
 
     if is_verbose():
         design_tables.print_design(compensator)
@@ -81,7 +80,7 @@ def print_design(compensator: "Compensator") -> None:
     for sign in compensator.signals.signs:
         certificate = compensator.side(sign).certificate
         low, high = (float(end) for end in certificate.dp_MPa)
-        which = "" if compensator.negative is None else f"{SIDE_NAMES[sign]}: "
+        which = f"{compensator.valve.side_name(sign)}: " if compensator.two_sided else ""
         put_line(
             console,
             f"{which}at zero command the output stays below the {100 * certificate.confidence:.6g} % bound of the "

@@ -107,7 +107,7 @@ def print_demo(valve: "ValveModel", verification: "Verification", folder: str) -
     put_line(
         console,
         "β (beta): change of the threshold with the pressure drop, which the firmware applies to its offset. Without "
-        f"it the offset stays that of {valve.positive.reference.dp_MPa:g} MPa, and flow passes at zero command where "
+        f"it the offset stays that of {valve.side().reference.dp_MPa:g} MPa, and flow passes at zero command where "
         "the threshold is lower.",
     )
     checked, wrong = (sum(getattr(each, name) for each in verification.evidence.inputs) for name in ("inputs", "wrong"))

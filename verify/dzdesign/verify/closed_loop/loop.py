@@ -10,7 +10,7 @@ import numpy as np
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.drive_functions import RAMP_UNIT
-from dzdesign.design.signals import SIDE_NAMES, Signals
+from dzdesign.design.signals import Signals
 from dzdesign.identify.valve.side_model import SideModel
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant, numbers_of, step_header
 from dzdesign.verify.closed_loop.stand_in import StandIn
@@ -205,7 +205,7 @@ class ClosedLoop:
         self.slowest_ramp_s = max(ramps_s, default=0.0)
         if functions.interlock_codes is not None:
             self.waits_s = functions.fault_samples / signals.sample_Hz
-        self._side = compensator.valve.sides.get(SIDE_NAMES[sign])
+        self._side = compensator.valve.sides.get(compensator.valve.side_name(sign))
 
     def _with(self, **changes: object) -> "ClosedLoop":
         """Return the same loop with other attributes; nothing is compiled again."""
