@@ -53,8 +53,8 @@ class VerifyArguments:
     """Pressure behind the metering edge in the closed loop (default: 0 and 1 MPa, or the span that the sensors have
     beside the tested pressure drops). Ramps run at the highest pressure, and failing sensors at each. Repeatable."""
     position_loop: Annotated[Text, Option("T", example=LOOP_WITH_GAIN, read=read_position_loop)] = None
-    """Lag of the valve, delay and velocity gain of a position loop around it, which is tried with the firmware of two
-    solenoids (default: without a gain, 80 % of what `design` states)."""
+    """Lag, delay and velocity gain of a position loop to try with a firmware of two solenoids (default: none; without a
+    gain 80 % of what `design` states)."""
     include: Annotated[Paths, Option("DIR", CHECKS)] = ()
     """Folder of headers for your board files, such as those of your chip. Repeatable."""
     board_code: Annotated[bool, Option(group=CHECKS)] = False
