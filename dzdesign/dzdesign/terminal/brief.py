@@ -87,13 +87,12 @@ def put_design(compensator: "Compensator", console: "Console") -> None:
     from dzdesign.design.position_loop import in_words
     from dzdesign.design.pressure_inputs import not_covered
     from dzdesign.design.redesign import hysteresis_choices, without_sensors
-    from dzdesign.design.signals import SIDE_NAMES
 
     units = compensator.valve.recorded_units
     for sign in compensator.signals.signs:
         certificate = compensator.side(sign).certificate
         low, high = (float(end) for end in certificate.dp_MPa)
-        which = "" if compensator.negative is None else f"{SIDE_NAMES[sign]}: "
+        which = f"{compensator.valve.side_name(sign)}: " if compensator.two_sided else ""
         put_line(
             console,
             f"{which}at zero command the output stays below the {100 * certificate.confidence:.6g} % bound of the "
