@@ -128,7 +128,6 @@ def print_assessment(assessment: "Assessment") -> None:
     put_facts(page, *section.tables)
     lines = [
         *section.lines,
-        *_ideal_line(assessment),
         *_not_observable(assessment),
         *_remarks(assessment),
         meter_line(meter.floor_L_min, lag_in_words(meter.lag_s, meter.lag_is), units),
@@ -138,16 +137,6 @@ def print_assessment(assessment: "Assessment") -> None:
     for line in lines:
         put_line(page, line)
     put_units(page, units, "assessment.json")
-
-
-def _ideal_line(assessment: "Assessment") -> list[str]:
-    """Return what a straight line from zero to the largest flow would read at the reading flow."""
-    read = [
-        f"{found.value:.2f} % ({item.place(assessment.recorded_units)})"
-        for item in _shown_pressures(assessment)
-        if (found := item.quantities["ideal_line"].after) and found.value is not None
-    ]
-    return [f"At the reading flow an ideal line from zero reads {', '.join(read)}."] if read else []
 
 
 def _not_observable(assessment: "Assessment") -> list[str]:
