@@ -197,8 +197,9 @@ def test_one_ramp_test_is_one_and_figures_of_two_sides_say_which_they_are_of(cha
     one, other = (synthetic_ramp(dp, Truth(), seed=7, rate_Hz=10.0) for dp in (1.0, 4.0))
     mirrored = [replace(test, source=f"minus_{test.source}", u=-test.u, q=-test.q) for test in (one, other)]
     alone = identify([one])
+    valves = (alone, identify([one, other, *mirrored]))
     with figure_style():
-        of_one, of_both = (thresholds_section(valve, None, None) for valve in (alone, identify([one, other, *mirrored])))
+        of_one, of_both = (thresholds_section(valve, None, None) for valve in valves)
     data = conditions_section(alone, None).lines
     assert data[0].startswith("1 ramp test; full command")
     assert of_one.figures == [None] and "nothing is certified at another" in of_one.lines[0]

@@ -283,10 +283,10 @@ class Page:
 
     `template` has the heading of every section, and what no report proves; `sections` by anchor what this one found;
     `missing` what is not there or not used, and which command makes it; `record` who and what, in the engineer's words.
-    `not_counted` is what of a machine no certificate here counts. Of a lot setting `lot` stands before all other
-    figures, and `carrier` is the one valve that `record` and `figures` are of. `subtitle` says what the report is of,
-    where the title names the valve; `lead` is the figure of the first page, `logo` a data: address. A `full` page has
-    no appendix folded, on a screen and on paper.
+    `of_figures` says what the figures are of, `not_counted` what of a machine no certificate here counts. Of a lot
+    setting `lot` stands before all other figures, and `carrier` is the one valve that `record` and `figures` are of.
+    `subtitle` says what the report is of, where the title names the valve; `lead` is the figure of the first page,
+    `logo` a data: address. A `full` page has no appendix folded, on a screen and on paper.
     """
 
     title: str
@@ -299,6 +299,7 @@ class Page:
     record: Sequence[tuple[str, str]] = ()
     lot: Sequence[Figure] = ()
     carrier: str = ""
+    of_figures: str = ""
     not_counted: Sequence[str] = ()
     subtitle: str = ""
     lead: ReportFigure | None = None

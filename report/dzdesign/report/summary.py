@@ -155,6 +155,17 @@ def key_figures(chain: Chain, found: CharacteristicQuantities) -> tuple[Figure, 
     return tuple(each for each in made if each)
 
 
+def sets_in_words(found: CharacteristicQuantities, units: RecordedUnits) -> str:
+    """Say of what the numbers that matter are: where those without and with the compensator are from, and the worst."""
+    words = {name: ORIGIN_WORDS[origin] for name in SETS if (origin := getattr(found, name))}
+    if not found.pressures or not words:
+        return ""
+    if len(words) == len(SETS):
+        return f"Without → with the compensator ({' → '.join(words.values())}); {worst_of(found.pressures, units)}."
+    (name, origin), *_ = words.items()
+    return f"{WITH_WORDS[name].capitalize()} ({origin}); {worst_of(found.pressures, units)}."
+
+
 def _values(found: CharacteristicQuantities, key: str, name: str) -> list[float] | None:
     """Return the values of a set at every pressure drop; None where one is not known."""
     read = [getattr(each, name).get(key, Found(None)).value for each in found.pressures]
@@ -181,8 +192,7 @@ def _dead_zone(chain: Chain, found: CharacteristicQuantities) -> Figure | None:
             fixed = without_sensors(chain.compensator) if chain.compensator else None
             left = None if fixed is None else fixed.onset if key == "onset_opening" else fixed.reading
             beside = "" if left is None else f"fixed MIN offset: {100 * left:.1f} %"
-            note = f"of command {where}, {worst_of(found.pressures, chain.recorded_units)}"
-            return Figure(label="Dead zone on opening", value=value, beside=beside, note=note)
+            return Figure(label="Dead zone on opening", value=value, beside=beside, note=f"of command {where}")
     return None
 
 
@@ -222,7 +232,6 @@ def _at_zero(chain: Chain, found: CharacteristicQuantities) -> Figure | None:
         label="Flow at zero command",
         value="none" if flow is not None and abs(flow) <= NO_FLOW_L_MIN and not hidden else text,
         note=f"after closing, {WITH_WORDS[name]}"
-        + (f" ({ORIGIN_WORDS[origin]})" if (origin := getattr(found, name)) else "")
         + ("; less than that the recordings do not show" if hidden else "")
         + (f"; {units.text(allowed, '.3g L/min')} are allowed" if allowed else ""),
         kind="bad" if beyond or False in limited else "text",

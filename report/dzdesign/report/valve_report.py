@@ -24,7 +24,7 @@ from dzdesign.report.sections.provenance import (
 )
 from dzdesign.report.sections.quantities import characteristic_curves, characteristic_quantities, pressure_hues
 from dzdesign.report.sections.valve import conditions_section, thresholds_section
-from dzdesign.report.summary import further_record, headline, key_figures, valve_name
+from dzdesign.report.summary import further_record, headline, key_figures, sets_in_words, valve_name
 from dzdesign.verify.verification import Verification, evidence_files
 
 REPORT_NAME = "report.html"
@@ -75,6 +75,7 @@ def make_report(chain: Chain, outputs: MadeOutputs = NO_OUTPUTS, logo: str = "",
         verdict=with_outputs(headline(chain), outputs, chain),
         record=tuple(further_record(chain.valve.record).items()) if chain.valve else (),
         figures=key_figures(chain, found),
+        of_figures=sets_in_words(found, chain.recorded_units),
         lot=lot_figures(chain),
         carrier=carrier_of(compensator) if compensator and compensator.lot else "",
         template="valve.html.jinja",

@@ -77,11 +77,12 @@ def characteristic_section(found: CharacteristicQuantities, units: RecordedUnits
         if origin
     ]
     arrow = "Values without → with the compensator" if found.after else "Values without the compensator"
+    shown = {row[0].text for table in tables for row in table.rows}
     tables[-1] = replace(
         tables[-1],
         notes=(
             "Terms as in ISO 10770-1; the formulas are those of dzdesign, and no conformity is claimed.",
-            *(f"{NAMES[key]}: {QUANTITIES[key].formula}." for key in EXPLAINED),
+            *(f"{NAMES[key]}: {QUANTITIES[key].formula}." for key in EXPLAINED if NAMES[key] in shown),
         ),
     )
     flows = [each.reading_flow_L_min for each in found.pressures if each.reading_flow_L_min > 0]

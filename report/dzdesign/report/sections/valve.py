@@ -135,11 +135,6 @@ def _trend(name: str, side: SideModel, units: RecordedUnits) -> str:
     )
 
 
-def _first_of(ramps: Sequence[str]) -> str:
-    """Return the first ramp of a test, and how many more there are; valve.json names them all."""
-    return f"{ramps[0]} and {len(ramps) - 1} more" if len(ramps) > 1 else ramps[0]
-
-
 def thresholds_table(side: SideModel, guard: str, title: str, units: RecordedUnits) -> Table:
     """Return the thresholds of each ramp test, with the lower bounds of the guarded one."""
     bounds = dict(zip(map(id, side.tests), side.certified[guard].u_lower_V, strict=True))
@@ -161,7 +156,7 @@ def thresholds_table(side: SideModel, guard: str, title: str, units: RecordedUni
         in_units("noise level", "noise_level_L_min", ".2f L/min", units),
         *(leaks if any(test.leak_L_min for test in side.tests) else ()),
         *(allowed if side.certificate.zero_flow_L_min is not None else ()),
-        ("ramp test", lambda test: _first_of(test.ramps)),
+        ("ramps", lambda test: in_number_font(str(len(test.ramps)))),
     )
 
 
