@@ -21,7 +21,7 @@ from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.artefacts import Chain
 from dzdesign.report.figure import figure_style
 from dzdesign.report.sections.quantities import characteristic_curves, characteristic_quantities
-from dzdesign.report.sections.valve import thresholds_section
+from dzdesign.report.sections.valve import conditions_section, thresholds_section
 from dzdesign.report.summary import key_figures
 from tests.support.synthetic import needs_compiler
 
@@ -160,7 +160,9 @@ def test_verify_speaks_of_what_was_recorded(folder, printed):
         assert unit in text, unit
     page = (folder / "evidence" / "report.html").read_text(encoding="utf-8")
     assert "requirements that were checked hold" in page
-    shown = re.sub(r"<style>.*?</style>|href=\"[^\"]*\"", "", page, flags=re.DOTALL)
+    # Options stand as they were given, or in the unit of their default.
+    unshown = r"<style>.*?</style>|href=\"[^\"]*\"|<li>Options of \w+: .*?</li>"
+    shown = re.sub(unshown, "", page, flags=re.DOTALL)
     texts = " | ".join(re.findall(r">([^<>]+)<", shown))
     assert not numbers_as_computed(texts), numbers_as_computed(texts)
     assert not re.search(r"\((mV|V|MPa|L/min)\)", texts)
@@ -223,7 +225,7 @@ def test_the_report_leads_with_them(valve):
         assert not numbers_as_computed(figure.description + figure.caption), figure.name
     assert ">pressure drop dP (bar)<" in figures[0].svg and "(mA)<" in figures[0].svg
     assert "knee_opening_V" in figures[0].csv.splitlines()[0]  # a file is in V
-    assert not numbers_as_computed(" ".join(sections["data"].lines))
+    assert not numbers_as_computed(" ".join(conditions_section(valve, None).lines))
     found = characteristic_quantities(valve, None, (), characteristic_curves(valve, None, {}))
     assert not any(numbers_as_computed(f"{each.value} {each.note}") for each in key_figures(Chain(valve=valve), found))
 
