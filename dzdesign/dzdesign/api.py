@@ -1,9 +1,9 @@
 """The stages as functions for notebooks and scripts: `identify`, `design`, `generate`, `verify` and their companions.
 
 Each function takes paths or the result of the previous stage. Options are written as on the command line, such as
-"1 MPa" or "0.1 s". The result is a frozen dataclass, which `print` summarises and a notebook shows as a table. With
-``output`` a function also writes the file or folder of the command of the same stage, byte for byte. Nothing is
-printed, and heavy packages are imported when a stage is called.
+"1 MPa" or "0.1 s", and go before those of an options file in ``config``. The result is a frozen dataclass, which
+`print` summarises and a notebook shows as a table. With ``output`` a function also writes the file or folder of the
+command of the same stage, byte for byte. Nothing is printed, and heavy packages are imported when a stage is called.
 
 `run` is the whole chain with one options file. `init`, `simulate`, `assess`, `report`, `batch` and `calibration`
 correspond to the commands of the same names;
@@ -48,15 +48,15 @@ def __dir__() -> list[str]:
 
 display_by(heading=heading_of, text=text_of, html=html_of)
 
-init = with_keywords(init_stage.InitArguments, init_stage.init)
+init = with_keywords(init_stage.InitArguments, init_stage.init, "init")
 run = with_keywords(run_stage.RunArguments, run_stage.run)
-identify = with_keywords(identify_stage.IdentifyArguments, identify_stage.identify)
-design = with_keywords(design_stage.DesignArguments, design_stage.design)
-generate = with_keywords(generate_stage.GenerateArguments, generate_stage.generate)
-calibration = with_keywords(calibration_stage.CalibrationArguments, calibration_stage.calibration)
+identify = with_keywords(identify_stage.IdentifyArguments, identify_stage.identify, "identify")
+design = with_keywords(design_stage.DesignArguments, design_stage.design, "design")
+generate = with_keywords(generate_stage.GenerateArguments, generate_stage.generate, "codegen")
+calibration = with_keywords(calibration_stage.CalibrationArguments, calibration_stage.calibration, "calibration")
 read_calibration = with_keywords(calibration_stage.ReadCalibrationArguments, calibration_stage.read_calibration)
-verify = with_keywords(verify_stage.VerifyArguments, verify_stage.verify)
-simulate = with_keywords(simulate_stage.SimulateArguments, simulate_stage.simulate)
-assess = with_keywords(assess_stage.AssessArguments, assess_stage.assess)
-report = with_keywords(report_stage.ReportArguments, report_stage.report)
-batch = with_keywords(BatchArguments, batch_stage.batch)
+verify = with_keywords(verify_stage.VerifyArguments, verify_stage.verify, "verify")
+simulate = with_keywords(simulate_stage.SimulateArguments, simulate_stage.simulate, "simulate")
+assess = with_keywords(assess_stage.AssessArguments, assess_stage.assess, "assess")
+report = with_keywords(report_stage.ReportArguments, report_stage.report, "report")
+batch = with_keywords(BatchArguments, batch_stage.batch, "batch")

@@ -11,8 +11,10 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
 from typing import Any, ForwardRef, ParamSpec, TypeVar, get_args
 
+from dzdesign.command_line.invocation import Value, completed, in_words_of_the_file
+from dzdesign.command_line.parser import CommonArguments
 from dzdesign.core.errors import DzdesignError, InputError, nearest, quoted
-from dzdesign.core.options import Argument, arguments_of
+from dzdesign.core.options import AnyPath, Argument, arguments_of
 from dzdesign.terminal.progress import reporting
 
 P = ParamSpec("P")
@@ -23,10 +25,11 @@ R = TypeVar("R")
 SECTION = re.compile(r"( *)\w+\n *-+\n")
 
 
-def with_keywords(declaration: Callable[P, A], stage: Callable[[A], R]) -> Callable[P, R]:
+def with_keywords(declaration: Callable[P, A], stage: Callable[[A], R], command: str = "") -> Callable[P, R]:
     """Return a stage as a function of the fields of its arguments, which reports no progress.
 
-    It refuses, in one sentence, an option that the stage lacks, and a value of another kind than is declared.
+    It refuses, in one sentence, an option that the stage lacks, and a value of another kind than is declared. That of
+    a command also takes ``config``, an options file: what it says stands behind the keywords, as on the command line.
 
     Examples
     --------
@@ -36,23 +39,33 @@ def with_keywords(declaration: Callable[P, A], stage: Callable[[A], R]) -> Calla
     dzdesign.core.errors.InputError: ramp_time: expected text with a unit such as '100 s', got 5
     """
     signature, name = inspect.signature(declaration), stage.__name__
-    declared = {argument.name: argument for argument in arguments_of(declaration)}
+    own = {argument.name: argument for argument in arguments_of(declaration)}
+    common = {argument.name: argument for argument in arguments_of(CommonArguments) if command}
+    declared = own | {key: common[key] for key in ("config",) if key in common}
 
     @wraps(stage)
     def call(*args: P.args, **kwargs: P.kwargs) -> R:
         for key in kwargs:
             if key not in declared:
                 raise InputError(f"{name} has no option {quoted(key)}{nearest(key, declared)}; see help({name})")
-        bound = signature.bind(*args, **kwargs)
+        config = kwargs.pop("config", None)
+        bound = (signature.bind if config is None else signature.bind_partial)(*args, **kwargs)
         for key, value in bound.arguments.items():
-            bound.arguments[key] = _checked(declared[key], value)
+            bound.arguments[key] = _checked(own[key], value)
+        from_file: dict[str, Value] = {}
         try:
             with reporting(quiet=True, verbose=False):
+                if config is not None:
+                    path = _checked(declared["config"], config)
+                    from_file = completed(command, tuple(own.values()), bound.arguments, path)
                 return stage(declaration(*bound.args, **bound.kwargs))
         except DzdesignError as error:
-            raise type(error)(_in_keywords(str(error), declared)) from error
+            message = in_words_of_the_file(str(error), str(config), from_file)
+            raise type(error)(_in_keywords(message, declared)) from error
 
     plain = [each.replace(annotation=_plain(each.annotation)) for each in signature.parameters.values()]
+    if command:
+        plain.append(inspect.Parameter("config", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=AnyPath))
     result = inspect.signature(stage).return_annotation
     call.__signature__ = inspect.Signature(plain, return_annotation=result)  # type: ignore[attr-defined]
     call.__doc__ = SECTION.sub(lambda found: _parameters(declared, found[1]) + found[0], stage.__doc__ or "", count=1)

@@ -50,12 +50,40 @@ def test_the_api_writes_the_bytes_of_the_commands(ramps, tmp_path, monkeypatch, 
     assert by_path == api.generate(api.design("valve.json", guard="mean", target="host"), target="host")
 
 
+def test_an_options_file_stands_behind_the_keywords_as_behind_the_command_line(ramps, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    lines = ['meter-lag = "0.1 s"', 'x-max = "1.8 mm"', 'guard = "mean"', "[record]", 'serial = "4711"', 'oil = "46"']
+    Path("dzdesign.toml").write_text("\n".join(lines))
+    words = ["--config", "dzdesign.toml", "--x-max", "2 mm", "--record", "serial = 4712"]
+    assert main(["identify", *map(str, ramps), *words]) == 0
+    assert main(["design", "valve.json", "--config", "dzdesign.toml"]) == 0
+    record = {"serial": "4712"}
+    valve = api.identify(ramps, config=Path("dzdesign.toml"), x_max="2 mm", record=record, output="api_valve.json")
+    api.design(valve, config="dzdesign.toml", output="api_compensator.json")
+    for name in ("valve.json", "compensator.json"):
+        assert Path(name).read_bytes() == Path(f"api_{name}").read_bytes()
+    assert valve.record == {"serial": "4712", "oil": "46"}
+    Path("wrong.toml").write_text('u-max = "10"\n')
+    for config, told in (
+        ("wrong.toml", "'wrong.toml': u-max is '10' without a unit; write for example u-max = \"10 V\""),
+        ("none.toml", "config file 'none.toml' does not exist"),
+        ("", "config: expected a path, got ''"),
+    ):
+        with pytest.raises(api.InputError) as error:
+            api.identify(ramps, config=config)
+        assert str(error.value).startswith(told)
+    with pytest.raises(api.InputError, match="read_calibration has no option 'config'"):
+        api.read_calibration("block.bin", config="dzdesign.toml")
+    assert main(["identify", *map(str, ramps), "--config", ""]) == 2
+    assert "--config is empty, expected the name of a file" in capsys.readouterr().err
+
+
 def test_the_options_are_those_of_the_commands():
     for command in ("init", "identify", "design", "codegen", "verify", "simulate", "assess", "report", "batch"):
         function = getattr(api, "generate" if command == "codegen" else command)
         arguments = (*arguments_of_command(command), *in_file(command))
         options = [argument.name for argument in arguments if argument.name != "list_targets"]
-        assert set(inspect.signature(function).parameters) == set(options)
+        assert set(inspect.signature(function).parameters) == {*options, "config"}
         for name in options:
             assert re.search(rf"^{name} : \w+", inspect.getdoc(function), re.MULTILINE), (command, name)
         assert re.search(r"\n\n *Raises\n *------\n", function.__doc__)

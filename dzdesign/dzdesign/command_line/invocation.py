@@ -1,6 +1,7 @@
 """What the user asked for: the command line, with an options file in TOML behind it, as a command's arguments."""
 
 import datetime
+import os
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,7 +18,7 @@ from dzdesign.command_line.parser import (
 )
 from dzdesign.core.documents import read_bytes, read_toml
 from dzdesign.core.errors import InputError, nearest, quoted
-from dzdesign.core.options import BOARD, MACHINE, Argument, arguments_of, flag_of
+from dzdesign.core.options import BOARD, MACHINE, AnyPath, Argument, arguments_of, flag_of
 from dzdesign.terminal.progress import say
 
 #: Characters of a key to which the nearest known one is looked for.
@@ -67,26 +68,45 @@ def parse(argv: list[str]) -> Invocation:
     json, quiet, verbose = (given.pop(key, False) for key in ("json", "quiet", "verbose"))
     if quiet and verbose:
         raise InputError("--quiet and --verbose contradict each other; give one of them")
-    declared, options_file = arguments_of(command_module(name).Arguments), given.pop("config", "")
-    values = _meant_values(name, options_file, declared) if options_file else {}
-    from_file = {key: value for key, value in values.items() if key not in given}
+    declared, options_file = arguments_of(command_module(name).Arguments), given.pop("config", None)
+    from_file = completed(name, declared, given, options_file) if options_file is not None else {}
     for argument in declared:
         key = argument.name
-        if argument.option.by_entry and (key in given or key in values):
-            given[key] = merged_entries(argument.flag, values.get(key), given.get(key, []))
-        elif key == "columns" and key in given and key in values:
-            given[key] = merged_columns(options_file, values[key], given[key])
-        elif key in from_file:
-            value = values[key]
-            given[key] = [value] if argument.is_repeatable and isinstance(value, str) else value
+        if argument.option.by_entry and isinstance(given.get(key), list):
+            given[key] = merged_entries(argument.flag, None, given[key])
         elif key not in given and argument.option.command_default:
             given[key] = argument.option.command_default
         if argument.is_path:
             _refuse_empty(argument, given.get(key), options_file if key in from_file else "")
     return Invocation(
         command=name, arguments=command_module(name).Arguments(**given), json=json, quiet=quiet, verbose=verbose,
-        options_file=options_file, from_file=from_file,
+        options_file=options_file or "", from_file=from_file,
     )  # fmt: skip
+
+
+def completed(
+    command: str, declared: tuple[Argument, ...], given: dict[str, Any], options_file: AnyPath
+) -> dict[str, Value]:
+    """Put what an options file says behind the options that were given; return those whose value is that of the file.
+
+    A given table of columns, or of entries of the record, stands on top of the file's, entry by entry.
+    """
+    path = os.fspath(options_file)
+    if not path:
+        raise InputError("--config is empty, expected the name of a file")
+    values = _meant_values(command, path, declared)
+    from_file = {key: value for key, value in values.items() if key not in given}
+    for argument in (each for each in declared if each.name in values):
+        key, value = argument.name, values[argument.name]
+        if argument.option.by_entry:
+            entries = given.get(key, [])
+            texts = [f"{name} = {text}" for name, text in entries.items()] if isinstance(entries, Mapping) else entries
+            given[key] = merged_entries(argument.flag, value, texts)
+        elif key == "columns" and key in given:
+            given[key] = merged_columns(path, value, given[key])
+        elif key in from_file:
+            given[key] = [value] if argument.is_repeatable and isinstance(value, str) else value
+    return from_file
 
 
 def _with_signed_values(argv: Sequence[str]) -> list[str]:
@@ -138,7 +158,7 @@ def _is_meant(value: Value, argument: Argument) -> bool:
     return argument.is_table if isinstance(value, dict) else argument.is_repeatable or isinstance(value, str)
 
 
-def merged_columns(path: str, of_file: Value, given: str) -> dict[str, str]:
+def merged_columns(path: str, of_file: Value, given: str | Mapping[str, str]) -> dict[str, str]:
     """Return the columns of the command line on top of those of the options file; pressures replace all pressures."""
     from dzdesign.identify.reading.column_labels import PRESSURES, parse_columns
 

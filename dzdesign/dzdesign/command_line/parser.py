@@ -17,7 +17,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, NoReturn
 
 from dzdesign.core.errors import InputError, nearest
-from dzdesign.core.options import GROUPS, Argument, Option, arguments_of
+from dzdesign.core.options import GROUPS, AnyPath, Argument, Option, arguments_of
 from dzdesign.core.version import __version__
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ EXIT_STATUS = """exit status:
 class CommonArguments:
     """Options of every command, before it or after it."""
 
-    config: Annotated[str, Option("TOML")] = ""
+    config: Annotated[AnyPath, Option("TOML")] = ""
     """File with options of the same names. `dzdesign init` writes one."""
     json: Annotated[bool, Option()] = False
     """Print the result as JSON."""

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from pkgutil import resolve_name
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 from dzdesign.core.artefact_files import write_file
 from dzdesign.core.documents import json_object, read_bytes, sha256_of, to_json
@@ -126,7 +126,8 @@ def run(arguments: RunArguments) -> Run:
         done.stage(_called(options, "verify", made, "-o", evidence), [made]),
     )
     name = OutputEvidence.FILE_NAME if target in OTHER_TARGETS else Evidence.FILE_NAME
-    found = read_artefact(read_bytes(Path(evidence) / name, "evidence"), (Evidence, OutputEvidence), name)
+    read = read_artefact(read_bytes(Path(evidence) / name, "evidence"), (Evidence, OutputEvidence), name)
+    found = cast("Evidence | OutputEvidence", read)
     warnings = read_artefact(read_bytes(Path(valve), "valve file"), ValveModel, valve).warnings
     codes, verdict = [each.code for each in warnings], found.verdict
     if isinstance(found, Evidence) and found.holds:

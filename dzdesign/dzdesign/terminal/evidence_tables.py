@@ -14,7 +14,6 @@ if TYPE_CHECKING:
 
     from dzdesign.assess.assessment import Assessment, PressureAssessment
     from dzdesign.core.recorded_units import RecordedUnits
-    from dzdesign.identify.valve.model import ValveModel
     from dzdesign.reproduce.artefact import LawNumber, ProductResult, RejectedReading, Reproduction
     from dzdesign.verify.evidence import Evidence
     from dzdesign.verify.loop_results import ScenarioResult
@@ -96,25 +95,6 @@ def _figures(result: "ScenarioResult", units: "RecordedUnits") -> str:
         number = result.in_words(value, units) if hidden else number
         groups[start].append(f"{name} {number} {units.label(unit) if unit in RECORDED else unit}".rstrip())
     return "; ".join(VALVES[start] + ", ".join(each) for start, each in groups.items() if each)
-
-
-def print_demo(valve: "ValveModel", verification: "Verification", folder: str) -> None:
-    """Print what the demo ends with: the dead zones and flows of the closed loop, and what was checked."""
-    from dzdesign.report.sections.closed_loop import loops_table, readings_table
-
-    console, pressures = new_console(), verification.evidence.closed_loop.pressures
-    put_line(console, "Simulated example valve, 0-10 V ramps in closed loop with the generated C.")
-    put_facts(console, loops_table(pressures, AS_COMPUTED), readings_table(pressures, AS_COMPUTED))
-    put_line(
-        console,
-        "β (beta): change of the threshold with the pressure drop, which the firmware applies to its offset. Without "
-        f"it the offset stays that of {valve.positive.reference.dp_MPa:g} MPa, and flow passes at zero command where "
-        "the threshold is lower.",
-    )
-    checked, wrong = (sum(getattr(each, name) for each in verification.evidence.inputs) for name in ("inputs", "wrong"))
-    put_line(console, f"Inputs checked: {checked}, wrong: {wrong}")
-    put_line(console, verification.verdict)
-    put_line(console, f"Open first: {folder}/evidence/report.html")
 
 
 def print_assessment(assessment: "Assessment") -> None:

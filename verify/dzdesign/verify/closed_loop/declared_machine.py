@@ -75,7 +75,7 @@ def readings_off(scene: Scene) -> Iterator[ScenarioResult]:
 def all_at_the_worst(scene: Scene) -> Iterator[ScenarioResult]:
     """Every tolerance of a declared machine at its end at once, on a valve that closes at its certified bound.
 
-    Coil, supply or current at each of their corners, oil and ageing where they take most of the threshold, pressures
+    Coil, supply or current at each of their declared corners, oil and ageing where they take most of the threshold, pressures
     read wrong either way and zero command too far into the side: the one of these that passes most is kept.
     """
     machine = scene.compensator.machine
@@ -87,7 +87,7 @@ def all_at_the_worst(scene: Scene) -> Iterator[ScenarioResult]:
     # A zero command that is read too far into the side counts for less of what an interlock waits for.
     rest = np.zeros(round((REST_S + scene.loop.waits_s) / STEP_S))
     command = np.concatenate([rest, scene.opened_and_closed()])
-    for corner in drive_corners(scene.compensator):
+    for corner in (each for each in drive_corners(scene.compensator) if not each.not_required):
         loop = (at_corner(scene, corner) or scene).loop.with_drive(1 / aged)
         there = replace(scene, loop=loop.with_added_drive(loop.added_V / aged + moved_V))
         for way in WAYS.values():
