@@ -342,7 +342,7 @@ def report_of(page: Page) -> Report:
         html=render(page),
         kind=verdict.kind,
         holds=verdict.holds,
-        verdict="; ".join(filter(None, (verdict.text, verdict.basis))),
+        verdict=". ".join(filter(None, (verdict.text, verdict.basis))),
         missing=tuple(page.missing),
     )
 
