@@ -280,7 +280,7 @@ def test_the_readme_shows_what_is_found(reproduced):
         row = found[valve, float(pressure[0])]
         assert (without, paper) == (f"{row['published_without']} %", f"{row['published']} %")
         assert (product, ideal) == (f"{row['dead_zone']:.1f} %", f"{row['ideal_line']:.1f} %")
-        assert zero == f"{row['zero_L_min']:g} L/min"
+        assert zero == f"{row['zero_L_min']:g}"
         assert row["ideal_line"] == pytest.approx(100 * 0.6 / float(row["published_largest"]), abs=1e-4)
     assert len(rows) == 4
 
