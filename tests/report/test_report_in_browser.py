@@ -3,12 +3,14 @@
 import contextlib
 import json
 import os
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from dzdesign.command_line.cli import main
 from dzdesign.core.documents import to_json
 from dzdesign.report.artefacts import read_chain
 from dzdesign.report.lot.page import report_of_lot
@@ -265,3 +267,28 @@ def test_the_checks_see_what_they_must(browser, pages, tmp_path):
         assert page.evaluate(LOST_LINKS) == ["#nowhere"]
         assert min(wide for wide, _ in page.evaluate(SIZES)) < 300
         assert {words.partition(":")[0] for words in heard} == {"console", "failed"}
+
+
+#: A root over a fraction, of display size.
+ROOT = "math[display=block] > mtable > mtr > mtd > mrow > msqrt:has(mfrac)"
+
+
+def has_tail(browser, path: Path, picture: Path) -> bool:
+    """Tell whether a root's sign reaches down to the foot of its fraction: ink in the lower left of its box."""
+    from matplotlib.image import imread
+
+    with opened(browser, path) as (page, _):
+        page.locator(ROOT).first.screenshot(path=picture)
+    ink = imread(picture)[..., :3].mean(axis=2) < 0.6
+    height, width = ink.shape
+    return bool(ink[height * 3 // 5 :, : width // 6].any())
+
+
+def test_a_root_of_the_derivation_stretches_over_its_fraction(browser, tmp_path):
+    page, plain = tmp_path / "derivation.html", tmp_path / "plain.html"
+    assert main(["derive", "--format", "html", "-o", str(page)]) == 0
+    text = page.read_text(encoding="utf-8")
+    plain.write_text(re.sub(r"math \{ font-family: [^;]*;", "math { font-family: sans-serif;", text), encoding="utf-8")
+    assert has_tail(browser, page, tmp_path / "root.png")
+    assert not has_tail(browser, plain, tmp_path / "plain.png")
+    assert "m<sup>3</sup>/s/V" in text and "(a constant pressure drop" in text

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import cached_property
 from math import ceil, floor
 from typing import Annotated, Literal
 
@@ -116,7 +117,7 @@ class PressureSignal:
         return self.span_MPa / (self.full_code - self.zero_code)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class PressurePair:
     """The two pressure inputs of one side; a difference is counted in codes of the sensor ahead."""
 
@@ -124,7 +125,7 @@ class PressurePair:
     ahead: PressureSignal
     behind: PressureSignal
 
-    @property
+    @cached_property
     def weight(self) -> int:
         """Weight of a code behind over 2^`WEIGHT_SHIFT`, in codes ahead; exactly one for like sensors."""
         return max(1, round(self.behind.per_code_MPa / self.ahead.per_code_MPa * WEIGHT_UNIT))

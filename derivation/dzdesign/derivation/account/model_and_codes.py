@@ -103,7 +103,7 @@ SIMULATION_MODEL = (
         witness=((X_e, 1 / s), (X_e.func(s + a), 1 / (s + a))),
         for_all=(s,),
         discrepancy=ORIFICE * (X_e.func(s + a) - X_e),
-        words="($a$ constant pressure drop, Assumption 4)",
+        words="(a constant pressure drop, Assumption 4)",
     )
     .remark(
         "Shown for a pressure drop that falls as exp(-2 a $t$) during a step: flow and travel are in proportion "

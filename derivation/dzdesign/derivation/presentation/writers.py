@@ -109,6 +109,7 @@ _PRINTED = (
     (re.compile(r" - "), " − "),
     (re.compile(r"(?<![\w)-])-(?=[\w(]|$)"), "−"),
     (re.compile(r"(?<=[\d)])-(?=[\d(])"), "–"),
+    (re.compile(r"(?<=[a-z])\^(\d)"), r"<sup>\1</sup>"),
 )
 _NAME = re.compile(r"(?P<base>[A-Za-z]\w*'?)(?:\((?:s|0|dP)\))?")
 _BY_NAME, _FUNCTIONS = {str(name): name for name in QUANTITIES}, {"sqrt": "√", "log": "ln "}

@@ -75,8 +75,8 @@ def readings_off(scene: Scene) -> Iterator[ScenarioResult]:
 def all_at_the_worst(scene: Scene) -> Iterator[ScenarioResult]:
     """Every tolerance of a declared machine at its end at once, on a valve that closes at its certified bound.
 
-    Coil, supply or current at each of their declared corners, oil and ageing where they take most of the threshold, pressures
-    read wrong either way and zero command too far into the side: the one of these that passes most is kept.
+    Coil, supply or current at each of their declared corners, oil and ageing where they take most of the threshold,
+    pressures read wrong either way and zero command too far into the side: what passes most of these is kept.
     """
     machine = scene.compensator.machine
     if machine is None:

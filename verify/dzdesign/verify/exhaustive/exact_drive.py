@@ -95,7 +95,14 @@ class DriveModel:
         #: What is remembered of the faults of the command and of the pressures: with an interlock a reset is one.
         self.commands = FaultMemory(needed, latches, needed if functions.interlock_codes is None else 0)
         both = FaultMemory(needed, latches, needed)
-        three = self.compensator.signals.pressure_c is not None
+        signals = self.compensator.signals
+        three = signals.pressure_c is not None
+        self.pairs = {sign: signals.pair(sign) for sign in signals.signs}
+        #: Of each side the last whole difference of codes that stands for no more than its last test.
+        self.last_drop = {
+            sign: floor(self.compensator.side(sign).certificate.dp_MPa[1] / pair.ahead.per_code_MPa)
+            for sign, pair in self.pairs.items()
+        }
         self.pressures = {1: both, -1: FaultMemory(needed, latches, needed) if three else both}
         self._turn_at_zero()
 
@@ -201,20 +208,18 @@ class DriveModel:
     def _unsound(self, sign: int) -> set[str]:
         """Return the pressures of a side whose codes no sound signal makes."""
         signals = self.compensator.signals
-        ends = {name: signals.pressures[name].valid_codes for name in signals.pair(sign).names}
+        ends = {name: signals.pressures[name].valid_codes for name in self.pairs[sign].names}
         return {name for name, (low, high) in ends.items() if not low <= self._codes[name] <= high}
 
     def _drop(self, sign: int) -> int:
         """Return the pressure drop of a side, in codes."""
-        pair = self.compensator.signals.pair(sign)
+        pair = self.pairs[sign]
         return pair.difference(*(self._codes[name] for name in pair.names))
 
     def _drop_is_odd(self, sign: int) -> tuple[bool, bool]:
         """Tell whether the drop of sound pressures is too far below zero, and whether it lies above the tests."""
-        drop, last_MPa = self._drop(sign), self.compensator.side(sign).certificate.dp_MPa[1]
-        # Of whole codes the first above the last test is one that stands for more than it.
-        above = drop * self.compensator.signals.pair(sign).ahead.per_code_MPa > last_MPa
-        return drop < -self.compensator.reverse_codes, above
+        drop = self._drop(sign)
+        return drop < -self.compensator.reverse_codes, drop > self.last_drop[sign]
 
     def _law(self, code: int) -> int:
         failed = -self.compensator.reverse_codes - 1
