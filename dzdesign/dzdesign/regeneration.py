@@ -203,7 +203,7 @@ def inputs_again(compensator: "Compensator", given: Mapping[str, Path]) -> "list
     from dzdesign.verify.requirements import PRESSURE_INPUTS
 
     valve = compensator.valve
-    if compensator.negative is None:
+    if not compensator.two_sided:
         return []
     stated = {each.sha256: each.source for each in valve.made_from}
     if set(stated) != set(given) or valve.options is None:

@@ -222,8 +222,9 @@ def test_a_valve_that_lacks_what_is_asked_for_is_refused(example_valve, wording)
         designed(dataclasses.replace(example_valve, sides={"positive": without_opening}), transition="1 %")
     with wording.refusal(InputError, "design: an untested side"):
         designed(example_valve, command_signal=BOTH_SIGNS)
-    with wording.refusal(InputError, "design: no positive side"):
-        design(dataclasses.replace(example_valve, sides={"negative": example_valve.positive}))
+    with wording.refusal(InputError, "design: an untested positive side"):
+        negative = dataclasses.replace(example_valve, sides={"negative": example_valve.positive})
+        designed(negative, command_signal=BOTH_SIGNS)
     with wording.refusal(InputError, "design: a short span"):
         designed(example_valve, pressure_span="4 MPa")
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dzdesign.core.errors import InputError
-from dzdesign.design.design_choices import position_loop
+from dzdesign.design.design_choices import read_position_loop
 from dzdesign.design.position_loop import GAINS, in_words, largest_gain, largest_gains
 from tests.support.designs import designed
 from tests.support.hunting import drawn, hunts, swinging
@@ -42,4 +42,4 @@ def test_design_says_it_of_each_side_and_a_slower_valve_bears_less(example_valve
 @pytest.mark.parametrize("text", ["20 ms", "20 ms, 2 ms, 1 ms", "0 s, 1 ms", "20 ms, 5 s", "20, 2"])
 def test_what_is_no_lag_and_delay_is_refused(text):
     with pytest.raises(InputError, match="--position-loop"):
-        position_loop(text, "--position-loop")
+        read_position_loop(text, "--position-loop")

@@ -10,11 +10,11 @@ PAGE = ROOT / "docs" / "reference" / "dependencies.md"
 
 
 def rows(page):
-    """Return of each package what its row says: licence, last release, purpose, and what would replace it."""
+    """Return of each package what its row says: licence, last release, and purpose."""
     found = {}
     for line in page.splitlines():
         cells = [cell.strip() for cell in line.strip("|").split("|")]
-        if line.startswith("| ") and len(cells) == 5 and cells[0] != "package":
+        if line.startswith("| ") and len(cells) == 4 and cells[0] != "package":
             found[cells[0]] = cells[1:]
     return found
 

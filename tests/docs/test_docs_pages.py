@@ -10,7 +10,7 @@ import pytest
 from dzdesign import api
 from dzdesign.command_line.parser import build_parser
 from dzdesign.example import example_folder
-from tests.support.documented_commands import agrees, commands_of, try_page
+from tests.support.documented_commands import Command, agrees, commands_of, run, try_page
 from tests.support.octave import OCTAVE
 from tests.support.paths import ROOT
 from tests.support.synthetic import needs_compiler
@@ -19,10 +19,9 @@ DOCS = ROOT / "docs"
 TUTORIAL = DOCS / "tutorial.md"
 #: Goes on in a clone of dzdesign: tests/codegen/test_targets.py runs it.
 ADD_TARGET = DOCS / "howto" / "add-target.md"
-#: Pages that go on where the tutorial ended, each with a copy of its folder.
+#: Pages that begin in the folder of `dzdesign demo`, each with a copy of it.
 HOW_TO = [
     DOCS / "before-after.md",
-    DOCS / "reference" / "budget.md",
     *sorted(
         page
         for page in (DOCS / "howto").glob("*.md")
@@ -38,27 +37,27 @@ pytestmark = [
 
 
 @pytest.fixture(scope="module")
-def after_tutorial(tmp_path_factory, request):
-    """The folder in which the tutorial was run, and what was wrong with the page."""
-    folder = tmp_path_factory.mktemp("docs") / "tutorial"
-    folder.mkdir()
-    (folder / "demo").mkdir()
-    (folder / "demo" / "example").symlink_to(example_folder())  # as `dzdesign demo demo` leaves it
-    return folder, try_page(TUTORIAL, folder, request.config.getoption("--update-docs"))
+def demo(tmp_path_factory):
+    """The folder that `dzdesign demo demo` makes."""
+    folder = tmp_path_factory.mktemp("docs")
+    status, printed = run(Command(shown="$ dzdesign demo demo", output="", status=0), folder)
+    assert status == 0, printed
+    return folder / "demo"
 
 
-def test_the_tutorial_prints_what_it_shows(after_tutorial):
-    folder, wrong = after_tutorial
-    assert wrong == []
-    assert (folder / "evidence" / "verification.json").is_file() and (folder / "assessment.json").is_file()
+def test_the_tutorial_prints_what_it_shows(tmp_path, request):
+    (tmp_path / "demo").mkdir()
+    (tmp_path / "demo" / "example").symlink_to(example_folder())  # as `dzdesign demo demo` leaves it
+    assert try_page(TUTORIAL, tmp_path, request.config.getoption("--update-docs")) == []
+    assert (tmp_path / "evidence" / "verification.json").is_file() and (tmp_path / "assessment.json").is_file()
 
 
 @pytest.mark.parametrize("page", HOW_TO, ids=lambda page: page.stem)
-def test_a_how_to_page_prints_what_it_shows(after_tutorial, page, tmp_path, request):
+def test_a_how_to_page_prints_what_it_shows(demo, page, tmp_path, request):
     if page.stem == "matlab" and OCTAVE is None:
         pytest.skip("no octave-cli on the path: apt install octave")
     folder = tmp_path / "page"
-    shutil.copytree(after_tutorial[0], folder, symlinks=True)
+    shutil.copytree(demo, folder, symlinks=True)
     assert try_page(page, folder, request.config.getoption("--update-docs")) == []
 
 

@@ -83,13 +83,6 @@ def test_the_reference_has_every_command_with_every_option(site):
             assert word in section, f"{name} {word}"
 
 
-def test_the_page_of_the_firmware_names_every_option_of_design():
-    page = (DOCS / "reference" / "firmware.md").read_text(encoding="utf-8")
-    common = {"--output", "--config", "--json"}
-    flags = {each.flag for each in arguments_of_command("design") if not each.is_positional}
-    assert [flag for flag in sorted(flags - common) if f"`{flag}`" not in page] == []
-
-
 def test_the_schemas_are_published_and_every_key_is_in_the_reference(site):
     page = (site / "reference" / "files.html").read_text(encoding="utf-8")
     text = html.unescape(re.sub(r"<[^>]+>", "", page))

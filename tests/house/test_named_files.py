@@ -14,7 +14,7 @@ NAMED = re.compile(
     rf"(?<![\w./<{{*-])(?:{'|'.join(FOLDERS)})/(?:[\w.-]+/)*[\w.-]+\.(?:py|md|toml|jinja|txt|ipynb|svg|gz|csv)\b"
 )
 #: What has a reader make files of his own.
-RECIPES = {ROOT / "docs" / "howto" / f"add-{what}.md" for what in ("file-format", "law", "target")}
+RECIPES = {ROOT / "docs" / "howto" / f"add-{what}.md" for what in ("file-format", "law", "statement", "target")}
 
 
 def texts() -> list[Path]:

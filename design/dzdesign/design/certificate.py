@@ -20,7 +20,7 @@ from dzdesign.design.design_choices import Above
 from dzdesign.design.machine import Allowance, Machine
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.side_law import Budget, Certificate, Sides
-from dzdesign.design.signals import SIDE_NAMES, Signals
+from dzdesign.design.signals import Signals
 from dzdesign.identify.valve.guard_curve import CertifiedCurve, Guard
 from dzdesign.identify.valve.side_model import SideModel
 
@@ -83,13 +83,13 @@ def with_certificates(compensator: Compensator) -> Compensator:
     """Return a compensator whose certificates and budgets are those that follow from the valve in it."""
     laws = {}
     for sign in compensator.signals.signs:
-        law, side = compensator.side(sign), compensator.valve.sides[SIDE_NAMES[sign]]
+        law, side = compensator.side(sign), compensator.valve.side(sign)
         guarded = GuardedSide.of(
             side, law.certificate.guard, compensator, compensator.u_max_V, compensator.allowance(sign)
         )
         certificate, budget = guarded.certify(law.u_min0_over_u_max, law.beta, compensator.beta_denominator)
         laws[sign] = replace(law, certificate=certificate, budget=budget)
-    return replace(compensator, sides=Sides(positive=laws[1], negative=laws.get(-1)))
+    return replace(compensator, sides=Sides.of(compensator.valve, laws))
 
 
 def guarded_curve(
@@ -223,7 +223,7 @@ def reach_of_certificate(compensator: Compensator) -> str:
         )
     sides: dict[str, list[str]] = {}
     for sign in compensator.signals.signs:
-        budget, name = compensator.side(sign).budget, SIDE_NAMES[sign]
+        budget, name = compensator.side(sign).budget, compensator.valve.side_name(sign)
         if budget is not None:
             sides.setdefault(taken_off(budget, compensator.valve.recorded_units.of_side(name)), []).append(name)
     parts = [f"{names[0]} commands: {text}" if len(sides) > 1 else text for text, names in sides.items()]

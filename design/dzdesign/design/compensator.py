@@ -29,7 +29,7 @@ from dzdesign.design.machine import Allowance, Machine, allowance_of, dither_res
 from dzdesign.design.side_law import SideLaw, Sides
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import CommandError, TargetInputs
-from dzdesign.identify.valve.model import ValveModel
+from dzdesign.identify.valve.model import SIDES, ValveModel
 
 
 @lru_cache(maxsize=64)
@@ -136,9 +136,13 @@ class Compensator(ShownInNotebooks, Artefact):
             value = getattr(self, name)
             if value < 1 or value & (value - 1):
                 raise RuleError(f"{name} is {value}, expected a power of two, so that the firmware needs no division")
-        if (self.negative is None) != (len(self.signals.signs) == 1):
-            raise RuleError("a command of both signs needs a law for both sides, one of one sign for one")
-        if self.current_drive is not None and self.current_drive.loop.two != (self.negative is not None):
+        driven = {self.valve.side_name(sign) for sign in self.signals.signs}
+        if {name for name in SIDES if getattr(self.sides, name)} != driven:
+            raise RuleError(
+                "a command of both signs needs a law for both sides, one of one sign for the positive side, or for the "
+                "negative one of a valve tested with that alone"
+            )
+        if self.current_drive is not None and self.current_drive.loop.two != self.two_sided:
             raise RuleError("a current loop of two solenoids needs a law for both sides, one of one solenoid for one")
         limit, command = self.drive_functions.compare_limit, self.signals.command
         if limit > self.signals.compare_max:
@@ -163,13 +167,18 @@ class Compensator(ShownInNotebooks, Artefact):
             raise RuleError(f"a play has {len(nodes)} nodes, expected {needed} for every command")
 
     @property
-    def positive(self) -> SideLaw:
-        """The law of positive commands."""
+    def two_sided(self) -> bool:
+        """True if the command has both signs and drives two solenoids."""
+        return len(self.signals.signs) == 2
+
+    @property
+    def positive(self) -> SideLaw | None:
+        """The law of the valve's positive side, if that is driven."""
         return self.sides.positive
 
     @property
     def negative(self) -> SideLaw | None:
-        """The law of negative commands, of a valve with two solenoids."""
+        """The law of the valve's negative side, if that is driven."""
         return self.sides.negative
 
     @property
@@ -184,9 +193,10 @@ class Compensator(ShownInNotebooks, Artefact):
 
     def side(self, sign: int = 1) -> SideLaw:
         """Return the law of one sign of command."""
-        side = self.positive if sign > 0 else self.negative
+        name = self.valve.side_name(sign)
+        side: SideLaw | None = getattr(self.sides, name)
         if side is None:
-            raise InputError("this compensator has no law for negative commands")
+            raise InputError(f"this compensator has no law for {name} commands")
         return side
 
     @property

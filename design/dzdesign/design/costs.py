@@ -10,7 +10,6 @@ from dzdesign.design.costs_at_tests import corners_of, costs_at_tests, last_open
 from dzdesign.design.drive_functions import RAMP_UNIT
 from dzdesign.design.machine import COPPER_PER_K, REFERENCE_C, Machine, premise_of_bench_current
 from dzdesign.design.pressure_inputs import ACCEPTED, hidden_failure, unseen_failures
-from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.identify.valve.reading_flow import default_reading_flow
 from dzdesign.identify.valve.side_model import SideModel
 
@@ -34,7 +33,7 @@ class ColderCoil:
 def colder_coil(compensator: Compensator, sign: int) -> ColderCoil:
     """Return what a coil 40 K colder than on the bench does at zero command, at the worst tested pressure drop."""
     factor = float(1 - COPPER_PER_K * COLDER_K)
-    side, u_max_V = compensator.valve.sides[SIDE_NAMES[sign]], float(compensator.u_max_V)
+    side, u_max_V = compensator.valve.side(sign), float(compensator.u_max_V)
     thresholds = side.certified[compensator.side(sign).certificate.guard].u_threshold_V
     found = []
     for test, threshold_V in zip(side.tests, thresholds, strict=True):
@@ -56,7 +55,7 @@ def colder_coil(compensator: Compensator, sign: int) -> ColderCoil:
 def machine_costs(compensator: Compensator, sign: int) -> list[str]:
     """Return the lines of one side; the premises of the machine stand with positive commands."""
     machine, budget = compensator.machine, compensator.side(sign).budget
-    units = compensator.valve.recorded_units.of_side(SIDE_NAMES[sign])
+    units = compensator.valve.recorded_units.of_side(compensator.valve.side_name(sign))
     if machine is None or budget is None:
         found = colder_coil(compensator, sign)
         flow = units.text(found.flow_L_min, ".2f L/min") if found.seen else "less than the recordings show"
@@ -73,7 +72,7 @@ def machine_costs(compensator: Compensator, sign: int) -> list[str]:
         f"({taken_mV / 1e3 / float(compensator.u_max_V):.2%} of command); the largest part: "
         f"{budget.largest.component}, {budget.largest.price:.2%}"
     ]
-    tests = compensator.valve.sides[SIDE_NAMES[sign]].tests
+    tests = compensator.valve.side(sign).tests
     # The machine that opens last, which the transition does not reach.
     last = [share for test in tests if (share := last_opening(compensator, test, sign)) is not None]
     if last:
@@ -96,7 +95,7 @@ def machine_costs(compensator: Compensator, sign: int) -> list[str]:
 def _jump(compensator: Compensator, machine: Machine, sign: int) -> str:
     """Say what the transition's end passes on the machine that opens earliest."""
     factor, found = float(machine.least_factor), []
-    for test in compensator.valve.sides[SIDE_NAMES[sign]].tests:
+    for test in compensator.valve.side(sign).tests:
         dp_code = compensator.signals.pair(sign).code_at(test.dp_MPa)
         at_end_V = corners_of(compensator, dp_code, sign).at_end * float(compensator.u_max_V)
         found.append(float(test.recorded.opening.flow_at(np.array([at_end_V / factor]))[0]))
@@ -113,7 +112,7 @@ def costs_of(compensator: Compensator) -> tuple[str, ...]:
     valve = compensator.valve
     lines = list(hidden_failures(compensator))
     for sign in compensator.signals.signs:
-        side, label = valve.sides[SIDE_NAMES[sign]], _side_label(compensator, sign)
+        side, label = valve.side(sign), _side_label(compensator, sign)
         lines += lines_of_tests(compensator, sign)
         lines += [label + line for line in machine_costs(compensator, sign)]
         lines += [label + line for line in _cost_of_side(compensator, side, sign)]
@@ -122,7 +121,7 @@ def costs_of(compensator: Compensator) -> tuple[str, ...]:
         f"a pressure difference below -{compensator.reverse_codes} codes counts as a sensor fault"
         + (
             " and selects the smallest beta"
-            if compensator.positive.certificate.released_from_MPa is None
+            if compensator.side().certificate.released_from_MPa is None
             else ". The offset is then zero, and the full dead zone is back"
         )
     )
@@ -155,7 +154,7 @@ def _released(compensator: Compensator) -> tuple[str, ...]:
 
 
 def _left_out(compensator: Compensator) -> list[str]:
-    if compensator.negative is not None or compensator.valve.sides.get("negative") is None:
+    if compensator.two_sided or len(compensator.valve.sides) == 1:
         return []
     return [
         "the valve's negative side is left out: the command has one sign; leave out --command-signal, or give one of "
@@ -165,7 +164,8 @@ def _left_out(compensator: Compensator) -> list[str]:
 
 def lines_of_tests(compensator: Compensator, sign: int) -> list[str]:
     """Return one line for each test of a side."""
-    label, units = _side_label(compensator, sign), compensator.valve.recorded_units.of_side(SIDE_NAMES[sign])
+    label, valve = _side_label(compensator, sign), compensator.valve
+    units = valve.recorded_units.of_side(valve.side_name(sign))
     return [label + cost.text(units) for cost in costs_at_tests(compensator, sign)]
 
 
@@ -173,7 +173,7 @@ def hidden_failures(compensator: Compensator) -> tuple[str, ...]:
     """Return one line for each failure of a signal that the firmware can't see; the first of `costs_of`."""
     lines = unseen_failures(compensator.signals)
     for sign in compensator.signals.signs:
-        label, name = _side_label(compensator, sign), SIDE_NAMES[sign]
+        label, name = _side_label(compensator, sign), compensator.valve.side_name(sign)
         hidden = hidden_failure(compensator, sign)
         if hidden is not None:
             what = hidden.text(compensator.valve.recorded_units.of_side(name))
@@ -187,12 +187,12 @@ def hidden_failures(compensator: Compensator) -> tuple[str, ...]:
 
 
 def _side_label(compensator: Compensator, sign: int) -> str:
-    return "" if compensator.negative is None else f"{SIDE_NAMES[sign]} side, "
+    return f"{compensator.valve.side_name(sign)} side, " if compensator.two_sided else ""
 
 
 def _cost_of_side(compensator: Compensator, side: SideModel, sign: int) -> list[str]:
     lines = []
-    units = compensator.valve.recorded_units
+    units, here = compensator.valve.recorded_units, compensator.valve.side_name(sign)
     crossed = [units.number(test.dp_MPa or 0.0, ".2f MPa") for test in side.tests if test.closes_above_opening]
     if crossed:
         lines.append(
@@ -200,8 +200,8 @@ def _cost_of_side(compensator: Compensator, side: SideModel, sign: int) -> list[
             "where it opens, so flow at zero command is possible"
         )
     certificate = compensator.side(sign).certificate
-    lines.append(below_in_words(certificate, side, units.of_side(SIDE_NAMES[sign])))
-    lines.append(above_in_words(compensator.above, certificate, side, units.of_side(SIDE_NAMES[sign])))
+    lines.append(below_in_words(certificate, side, units.of_side(here)))
+    lines.append(above_in_words(compensator.above, certificate, side, units.of_side(here)))
     if compensator.machine is None:  # else the budget says more
         lines.append(
             f"rounding and the beta table keep the offset {units.text(1e3 * certificate.mean_loss_V, '.2f mV')} below "
@@ -235,7 +235,7 @@ def _cost_of_options(compensator: Compensator) -> list[str]:
             f"ramps: {_ramp_text(compensator)}; they hold for zero command too: the valve closes no faster than they "
             "let it"
         )
-    if compensator.negative is not None:
+    if compensator.two_sided:
         share = functions.leave_zero_codes / signals.command.span(1)
         lines.append(
             f"coming from the other sign a command must pass zero by {share:.2%} before its solenoid is driven: that "
@@ -284,7 +284,7 @@ def _cost_of_zero_band(compensator: Compensator) -> list[str]:
 def _lift_V(compensator: Compensator) -> float:
     """Return by how much the declared error of a zero command lifts the drive at dP0, V."""
     command = compensator.signals.command
-    reference = compensator.valve.positive.reference.dp_MPa or 0.0
+    reference = compensator.valve.side().reference.dp_MPa or 0.0
     dp_code = compensator.signals.pair(1).code_at(reference)
     at = (0, min(compensator.command_error.zero_band_codes, command.span(1)))
     low, high = (compensator.drive(command.zero_code + command.direction(1) * each, dp_code) for each in at)
@@ -306,7 +306,7 @@ def _ramp_text(compensator: Compensator) -> str:
     parts = []
     for place, sign in enumerate(signals.signs):
         for way, steps in (("up", functions.ramp_up), ("down", functions.ramp_down)):
-            name = way if compensator.negative is None else f"{SIDE_NAMES[sign]} {way}"
+            name = f"{compensator.valve.side_name(sign)} {way}" if compensator.two_sided else way
             seconds = signals.command.span(sign) * RAMP_UNIT / (steps[place] * signals.sample_Hz) if steps[place] else 0
             parts.append(f"{name} {seconds:.4g} s" if seconds else f"{name} at once")
     return ", ".join(parts)

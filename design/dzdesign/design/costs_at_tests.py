@@ -9,7 +9,6 @@ import numpy as np
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.identify.valve.ramp_result import TestResult
 from dzdesign.identify.valve.reading_flow import ideal_line
 
@@ -112,12 +111,12 @@ class CostAtTest:
 
 def costs_at_tests(compensator: Compensator, sign: int) -> tuple[CostAtTest, ...]:
     """Return what remains at every tested pressure drop of a side; an output that never opens the valve is refused."""
-    tests = compensator.valve.sides[SIDE_NAMES[sign]].tests
+    tests = compensator.valve.side(sign).tests
     return tuple(_cost_at_test(compensator, test, sign) for test in tests)
 
 
 def _cost_at_test(compensator: Compensator, test: TestResult, sign: int) -> CostAtTest:
-    side, u_max = SIDE_NAMES[sign], float(compensator.u_max_V)
+    side, u_max = compensator.valve.side_name(sign), float(compensator.u_max_V)
     corners = corners_of(compensator, compensator.signals.pair(sign).code_at(test.dp_MPa), sign)
     corners_of_falling = falling_corners(compensator, compensator.signals.pair(sign).code_at(test.dp_MPa), sign)
     offset_V, left = corners.offset * u_max, remaining_dead_zone(compensator, test, sign)
@@ -185,7 +184,7 @@ def between_tests(compensator: Compensator, sign: int) -> float:
     There the opening knee is taken as straight. The law's beta is so between the table's nodes, so that one of these,
     or a test, has the largest. 0 without a rising branch, without pressure, and of tests with no node between.
     """
-    tests = compensator.valve.sides[SIDE_NAMES[sign]].tests
+    tests = compensator.valve.side(sign).tests
     known = [
         (test.dp_MPa, test.u_knee_rising_V)
         for test in tests

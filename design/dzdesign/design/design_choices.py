@@ -47,7 +47,8 @@ TEMPERATURES = re.compile(
     rf"\s*(?P<low>{DEGREES})\s*(?:(?:\.\.|to)\s*(?P<high>{DEGREES})\s*)?(?P<unit>(?:deg|°)?\s?[CF])\s*", re.ASCII
 )
 #: Lag of a usual proportional valve, and delay of a loop that runs in the drive; shortest and longest that are tried.
-LOOP = "20 ms, 2 ms"
+LOOP, LOOP_WITH_GAIN = "20 ms, 2 ms", "20 ms, 2 ms, 300/s"
+VELOCITY_GAIN, LARGEST_GAIN = re.compile(r"(\d+(?:\.\d+)?)(?: 1| )?/s"), 1e6
 SHORTEST_LAG_S, LONGEST_LAG_S = 1e-3, 1.0
 CHANNEL = re.compile(r"[A-D]\d{1,2}", re.ASCII)
 MOST_HZ = 150e6
@@ -126,18 +127,24 @@ def _converter_errors(text: str, option: str) -> tuple[int, ...]:
     return tuple(map(int, found.groups()))
 
 
-def position_loop(text: str, option: str) -> tuple[float, float]:
-    """Read the lag of a valve and the delay of a loop around it, s."""
-    parts = text.split(",")
-    if len(parts) != 2:
-        raise InputError(f"{option} is {quoted(text)}, expected a lag and a delay, such as '{LOOP}'")
-    lag, delay = (parse_quantity(part.strip(), "time", option) for part in parts)
+def read_position_loop(text: str, option: str) -> tuple[float, float, float | None]:
+    """Read the lag of a valve and the delay of a loop around it, s, and its velocity gain, 1/s; None: none stated."""
+    parts = [part.strip() for part in text.split(",")]
+    found = VELOCITY_GAIN.fullmatch(parts[2]) if len(parts) == 3 else None
+    if len(parts) != 2 and found is None:
+        raise InputError(
+            f"{option} is {quoted(text)}, expected a lag and a delay, and a gain if you state one: '{LOOP_WITH_GAIN}'"
+        )
+    gain = float(found[1]) if found else None
+    if gain is not None and not 0 < gain <= LARGEST_GAIN:
+        raise InputError(f"{option} is {quoted(text)}, expected a gain above zero, {LARGEST_GAIN:g}/s at most")
+    lag, delay = (parse_quantity(part, "time", option) for part in parts[:2])
     if not SHORTEST_LAG_S <= lag <= LONGEST_LAG_S or not 0 <= delay <= LONGEST_LAG_S:
         raise InputError(
             f"{option} is {quoted(text)}, expected a lag of {SHORTEST_LAG_S * 1e3:g} ms to {LONGEST_LAG_S:g} s, and a "
             f"delay of at most {LONGEST_LAG_S:g} s"
         )
-    return lag, delay
+    return lag, delay, gain
 
 
 def _crystal(text: str, option: str) -> int:
@@ -251,7 +258,7 @@ class DesignChoices:
     reading_flow: Annotated[Text, Option("Q", LAW, example="0.6 L/min", read=_reading_flow)] = None
     """Flow at which dead zones are read, in addition to the onset (default: the meter's floor, or the noise level of a
     meter without one)."""
-    position_loop: Annotated[Text, Option("T", LAW, LOOP, example=LOOP, read=position_loop)] = None
+    position_loop: Annotated[Text, Option("T", LAW, LOOP, example=LOOP, read=read_position_loop)] = None
     """Lag of the valve and delay of a position loop around it, of which `design` states the largest gain that does not
     hunt. Nothing of the firmware depends on it."""
     output_max: Annotated[Text, Option("C", LAW, "100 %", example="95 %", read=share(Fraction(1), or_zero=False))] = (

@@ -30,7 +30,7 @@ from dzdesign.design.options import DesignOptions
 from dzdesign.design.pressure_inputs import ACCEPTED, refuse_hidden_failures, with_pressure_inputs
 from dzdesign.design.side_design import finest_that_fit, finest_units, refuse_two_signs, side_law
 from dzdesign.design.side_law import Sides
-from dzdesign.design.signals import SIDE_NAMES, Signals
+from dzdesign.design.signals import Signals
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.reading_flow import default_reading_flow
 
@@ -83,7 +83,7 @@ def _designed(valve: ValveModel, options: DesignOptions) -> Compensator:
     current_drive = options.current_drive()
     reserve, laws = dither_reserve(dither, valve.dither, options.machine, current_drive), {}
     for sign in signals.signs:
-        side = valve.positive if sign > 0 else valve.sides["negative"]
+        side = valve.side(sign)
         allowance = allowance_of(signals, options.machine, sign=sign, dither_counts=reserve)
         laws[sign] = side_law(side, options, u_max, units, transition_codes, allowance)
     compensator = Compensator(
@@ -96,7 +96,7 @@ def _designed(valve: ValveModel, options: DesignOptions) -> Compensator:
         above=options.above,
         signals=signals,
         u_max_V=u_max,
-        sides=Sides(positive=laws[1], negative=laws.get(-1)),
+        sides=Sides.of(valve, laws),
         beta_denominator=units.beta,
         beta_step_codes=STEP_CODES,
         reverse_codes=_reverse_codes(signals),
@@ -138,7 +138,7 @@ def _full_command(valve: ValveModel, options: DesignOptions) -> Fraction:
 
 def _transition_codes(valve: ValveModel, options: DesignOptions) -> int:
     """Return the codes of the transition; where nothing is said, none for a valve whose opening was not recorded."""
-    sides = [valve.sides[SIDE_NAMES[sign]] for sign in options.signals.signs if SIDE_NAMES[sign] in valve.sides]
+    sides = [valve.side(sign) for sign in options.signals.signs]
     if options.transition is None and not options.play and any(side.opening_curve is None for side in sides):
         return 0
     codes = options.transition_codes()
@@ -219,7 +219,7 @@ def play_nodes(compensator: Compensator, sign: int, step: int) -> tuple[int, ...
 
 def _recorded_widths(compensator: Compensator, sign: int) -> Iterator[list[tuple[float, float]]]:
     """Yield for each test the command of the law, a share, and how far the recorded branches lie apart there, V."""
-    for test in compensator.valve.sides[SIDE_NAMES[sign]].tests:
+    for test in compensator.valve.side(sign).tests:
         if test.u_knee_rising_V is None or test.u_knee_falling_V is None:
             continue
         corners = corners_of(compensator, compensator.signals.pair(sign).code_at(test.dp_MPa), sign)

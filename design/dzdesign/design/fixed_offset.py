@@ -17,7 +17,6 @@ from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs_at_tests import falling_corners, flow_at_end, remaining_dead_zone
 from dzdesign.design.side_law import Component
-from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.identify.valve.certified_bound import BoundPiece
 from dzdesign.identify.valve.ramp_result import TestResult
 
@@ -109,7 +108,7 @@ def fixed_offset(compensator: Compensator, sign: int = 1) -> FixedOffset:
         If no positive offset is left, or a valve of the lot has no bounds of this side.
     """
     allowance = compensator.allowance(sign)
-    model = compensator.valve.sides[SIDE_NAMES[sign]]
+    model, side = compensator.valve.side(sign), compensator.valve.side_name(sign)
     # Above the tests the bound goes down: a gauge that read too little there had tests at higher pressure drops.
     guard, machine = compensator.side(sign).certificate.guard, compensator.machine
     curve = guarded_curve(model, guard, compensator.below_dp0, "lower", machine)
@@ -123,7 +122,7 @@ def fixed_offset(compensator: Compensator, sign: int = 1) -> FixedOffset:
     share = least_V * allowance.factor / compensator.u_max_V - kept
     if share <= 0:
         raise InputError(
-            f"no fixed offset of the {SIDE_NAMES[sign]} side is safe at every pressure drop: budget and dither take "
+            f"no fixed offset of the {side} side is safe at every pressure drop: budget and dither take "
             "all of the certified one; use the law with pressure sensors, or declare a smaller budget"
         )
     return FixedOffset(sign=sign, share=share, lowest_at_MPa=lowest_at, dp_MPa=(curve.dp_MPa[0], curve.dp_MPa[-1]))
@@ -215,7 +214,7 @@ class FixedDeadZone:
 
 def dead_zones(compensator: Compensator, characteristic: Characteristic, sign: int = 1) -> tuple[FixedDeadZone, ...]:
     """Return what a characteristic leaves at each tested pressure drop of a side, and what the compensator leaves."""
-    tests = compensator.valve.sides[SIDE_NAMES[sign]].tests
+    tests = compensator.valve.side(sign).tests
     return tuple(_at_test(compensator, characteristic, test, sign) for test in tests)
 
 
@@ -226,7 +225,7 @@ def _at_test(compensator: Compensator, characteristic: Characteristic, test: Tes
     by_law = falling_corners(compensator, dp_code, sign).at_end
     by_fixed = float(characteristic.drive(Fraction(end_code, signals.command.span(sign))))
     return FixedDeadZone(
-        side=SIDE_NAMES[sign],
+        side=compensator.valve.side_name(sign),
         dp_MPa=test.dp_MPa or 0.0,
         fixed={
             branch: _left(characteristic, Fraction(repr(knee)) / compensator.u_max_V)

@@ -28,7 +28,6 @@ from dzdesign.design.lot_valves import LotValve
 from dzdesign.design.options import options_of
 from dzdesign.design.side_design import finest_units, left_by_machine, offset_at_reference, over, travel
 from dzdesign.design.side_law import SideLaw, Sides
-from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.identify.valve.certified_bound import BoundPiece
 from dzdesign.identify.valve.side_model import SideModel
 
@@ -112,7 +111,7 @@ def lot_setting(batch: Mapping[str, Compensator]) -> LotSetting:
     _, carrier, laws = best
     compensator = replace(
         _without_transition(batch[carrier]),
-        sides=Sides(positive=laws[1], negative=laws.get(-1)),
+        sides=Sides.of(batch[carrier].valve, laws),
         costs=(),
         lot=_lot(batch, first, sides),
     )
@@ -147,10 +146,15 @@ def _shared_design(batch: Mapping[str, Compensator]) -> Compensator:
     """Return one compensator, whose options are those of all; refuse valves that were designed otherwise."""
     if len(batch) < 2:
         raise InputError(f"a lot setting needs two valves or more, got {len(batch)}")
+    if alone := [name for name, each in batch.items() if each.positive is None]:
+        raise InputError(
+            f"'{alone[0]}' was tested with negative commands alone, of which no lot setting is made; record its "
+            "positive ones too, or design each valve by itself"
+        )
     name, first = next((name, each) for name, each in batch.items())
     for other, each in batch.items():
         unlike = [field for field in SHARED if getattr(each, field) != getattr(first, field)]
-        if each.positive.certificate.guard != first.positive.certificate.guard:
+        if each.side().certificate.guard != first.side().certificate.guard:
             unlike.append("guard")
         if each.valve.dither != first.valve.dither:
             unlike.append("dither of the recordings")
@@ -196,7 +200,7 @@ def _common_interval(sides: Iterable[Mapping[str, OffsetCurve]]) -> tuple[float,
 def _side(batch: Mapping[str, Compensator], first: Compensator, sign: int) -> _Side:
     """Find the least ceiling of one sign of command, exactly, and which valves hold it down."""
     pair, allowance = first.signals.pair(sign), first.allowance(sign)
-    models = {name: each.valve.sides[SIDE_NAMES[sign]] for name, each in batch.items()}
+    models = {name: each.valve.side(sign) for name, each in batch.items()}
     guard = first.side(sign).certificate.guard
     curves = {
         name: guarded_curve(model, guard, first.below_dp0, first.above, first.machine) for name, model in models.items()

@@ -15,15 +15,14 @@ that lies above the threshold cycles at any gain: about zero the valve is never 
 
 from dataclasses import dataclass
 from functools import cache
-from math import atan, ceil, floor, hypot, log10, pi
+from math import atan, ceil, floor, hypot, inf, log10, pi
 
 import numpy as np
 from scipy.optimize import brentq
 
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs_at_tests import LawCorners, corners_of
-from dzdesign.design.design_choices import LOOP, position_loop
-from dzdesign.design.signals import SIDE_NAMES
+from dzdesign.design.design_choices import LOOP, read_position_loop
 
 #: Commands from which the loop is let go, over full; and shares of the recorded hysteresis that small cycles may have.
 STARTS = np.array([0.01, 0.03, 0.1, 0.3, 1.0])
@@ -35,6 +34,8 @@ REFINED = 12
 PERIODS, LAST = 40, 0.25
 #: A loop whose swing falls by less in a quarter of the time is said to cycle.
 DECAY = 0.98
+#: Of a sample: a delay that is a whole number of them but for its last bits is not one more.
+SAME_SAMPLE = 1e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -146,7 +147,7 @@ class _Loop:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LargestGain:
-    """The largest velocity gain that comes to rest at one test, and that of an ideal line, 1/s."""
+    """The largest velocity gain that comes to rest at the test where it is least, and that of an ideal line, 1/s."""
 
     side: str
     dp_MPa: float
@@ -155,9 +156,13 @@ class LargestGain:
 
 
 @cache
-def largest_gain(loop: Swinging) -> float:
-    """Return the largest velocity gain up to which the loop comes to rest, 1/s; 0 if it never does."""
+def largest_gain(loop: Swinging, most: float = inf) -> float:
+    """Return the largest velocity gain up to which the loop comes to rest, 1/s; 0 if it never does.
+
+    Of a loop that comes to rest up to `most` it is no less than that.
+    """
     tried = GAINS * loop.linear_gain
+    tried = tried[: np.searchsorted(tried, most) + 1]
     rests = loop.rests(tried)
     if rests.all():
         return float(tried[-1])
@@ -169,53 +174,52 @@ def largest_gain(loop: Swinging) -> float:
 
 
 def largest_gains(compensator: Compensator, lag_s: float, delay_s: float) -> tuple[LargestGain, ...]:
-    """Return the largest gain of each side, at the test whose flow begins most steeply behind the zero band."""
-    found = []
+    """Return the largest gain of each side: the least of its tests.
+
+    What the interrupt writes counts from the next PWM period on, and a command waits for a sample: the delay is
+    rounded up to whole samples.
+    """
+    found, signals = [], compensator.signals
+    late_s = ceil((delay_s + 1 / signals.tick_Hz) * signals.sample_Hz - SAME_SAMPLE) / signals.sample_Hz
     for sign in compensator.signals.signs:
-        loops = []
-        for test in compensator.valve.sides[SIDE_NAMES[sign]].tests:
+        gains: list[tuple[float, float, float]] = []
+        for test in compensator.valve.side(sign).tests:
             opens, closes = test.u_knee_rising_V, test.u_knee_falling_V
             if opens is None and closes is None:
                 continue
             knees = [knee / float(compensator.u_max_V) for knee in (opens, closes) if knee is not None]
             law = corners_of(compensator, compensator.signals.pair(sign).code_at(test.dp_MPa), sign)
             loop = Swinging(
-                lag_s=lag_s, delay_s=delay_s, sample_Hz=compensator.signals.sample_Hz, law=law,
+                lag_s=lag_s, delay_s=late_s, sample_Hz=signals.sample_Hz, law=law,
                 opens=max(knees), closes=min(knees),
             )  # fmt: skip
-            loops.append((_steepness(loop), test.dp_MPa or 0.0, loop))
-        if loops:
-            _, dp_MPa, loop = max(loops, key=lambda each: each[0])
-            gain, linear = largest_gain(loop), loop.linear_gain
-            found.append(LargestGain(side=SIDE_NAMES[sign], dp_MPa=dp_MPa, gain=gain, linear=linear))
+            least = min((gain for gain, *_ in gains), default=inf)
+            gains.append((largest_gain(loop, least), test.dp_MPa or 0.0, loop.linear_gain))
+        if gains:
+            gain, dp_MPa, linear = min(gains)
+            found.append(LargestGain(side=compensator.valve.side_name(sign), dp_MPa=dp_MPa, gain=gain, linear=linear))
     return tuple(found)
 
 
 def in_words(compensator: Compensator) -> list[str]:
     """Return what the largest gains are, a line each; nothing of a valve without a knee."""
     options = compensator.options or {}
-    lag_s, delay_s = position_loop(options.get("position_loop") or LOOP, "--position-loop")
+    lag_s, delay_s, _ = read_position_loop(options.get("position_loop") or LOOP, "--position-loop")
     units = compensator.valve.recorded_units
     lines = []
     for each in largest_gains(compensator, lag_s, delay_s):
         at = units.text(each.dp_MPa, ".2f MPa")
         lines.append(
             f"position loop (P) around the {each.side} side, lag {1e3 * lag_s:g} ms, delay {1e3 * delay_s:g} ms: it "
-            f"comes to rest up to a velocity gain of {_rounded_down(each.gain)}/s (an ideal line: "
-            f"{_rounded_down(each.linear)}/s), at {at}, with any play up to the recorded hysteresis"
+            f"comes to rest up to a velocity gain of {rounded_down(each.gain)}/s (an ideal line: "
+            f"{rounded_down(each.linear)}/s), at {at}, with any play up to the recorded hysteresis"
         )
     return lines
 
 
-def _rounded_down(gain: float) -> str:
+def rounded_down(gain: float) -> str:
     """Return a number with two digits, rounded to the safe side."""
     if gain <= 0:
         return "0"
     step = 10.0 ** (floor(log10(gain)) - 1)
     return f"{floor(gain / step) * step:g}"
-
-
-def _steepness(loop: Swinging) -> float:
-    law = loop.law
-    rise = (law.at_end - law.offset) / (law.end - law.zero_band) if law.end > law.zero_band else 1.0
-    return rise / (law.full - loop.opens)

@@ -15,10 +15,10 @@ from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.signal_text import live_zero_signal
-from dzdesign.design.signals import INPUT_NAMES, POSITIVE_PAIR, SIDE_NAMES, InputPair, Signals
+from dzdesign.design.signals import INPUT_NAMES, POSITIVE_PAIR, InputPair, Signals
 from dzdesign.design.target_inputs import Converter
 from dzdesign.identify.reading.metering_edge import TWO_SENSORS
-from dzdesign.identify.valve.model import ValveModel
+from dzdesign.identify.valve.model import SIDES, ValveModel
 from dzdesign.identify.valve.recorded_drop import DropQuantity, RecordedDrop
 
 #: What recordings show where they show no pair of inputs. A dP that is above zero on both sides may be a magnitude, and
@@ -114,13 +114,14 @@ def wiring_in_words(compensator: Compensator) -> list[str]:
     lines = []
     if names := input_columns(compensator):
         inputs = ", ".join(f"{name} = {column}" for name, column in names.items())
-        lines.append(f"pressure inputs: {inputs}, as recorded{'' if 'C' in names else ' at positive commands'}")
-    return lines + ([negative_drop_in_words(compensator)] if compensator.negative else [])
+        where = "" if "C" in names else f" at {compensator.valve.side_name(1)} commands"
+        lines.append(f"pressure inputs: {inputs}, as recorded{where}")
+    return lines + ([negative_drop_in_words(compensator)] if compensator.two_sided else [])
 
 
 def negative_drop_in_words(compensator: Compensator) -> str:
     """Say how the pressure drop of negative commands comes of the inputs, and why; nothing for one sign."""
-    if compensator.negative is None:
+    if not compensator.two_sided:
         return ""
     drop = _minus(compensator.signals.negative_pair)
     recorded = _recorded(compensator.valve, "negative")
@@ -130,7 +131,7 @@ def negative_drop_in_words(compensator: Compensator) -> str:
 def input_columns(compensator: Compensator) -> dict[str, str]:
     """Return the recorded columns that the pressure inputs stand for, by name; none where no two were recorded."""
     pair = compensator.signals.negative_pair
-    columns = dict(zip(POSITIVE_PAIR, _columns(compensator, "positive"), strict=False))
+    columns = dict(zip(POSITIVE_PAIR, _columns(compensator, compensator.valve.side_name(1)), strict=False))
     if columns and "C" in pair:
         columns |= {
             name: column
@@ -151,7 +152,7 @@ def _columns(compensator: Compensator, side: str) -> list[str]:
 
 def is_wired(compensator: Compensator) -> bool:
     """Tell whether the machine is declared to switch the pressure inputs."""
-    return (compensator.options or {}).get("negative_dp") == "wired" and compensator.negative is not None
+    return (compensator.options or {}).get("negative_dp") == "wired" and compensator.two_sided
 
 
 def what_machine_switches(compensator: Compensator) -> str:
@@ -181,8 +182,10 @@ def _recorded(valve: ValveModel, side: str) -> str:
 
 def not_covered(compensator: Compensator) -> tuple[str, ...]:
     """Return each thing that a good verdict says nothing of, as a part of its sentence."""
-    if compensator.negative is None:
-        if "negative" not in compensator.valve.sides:
+    if not compensator.two_sided:
+        if compensator.positive is None:
+            return ("commands from zero to full drive the valve's negative side: its positive one was not tested",)
+        if len(compensator.valve.sides) == 1:
             return ()
         return ("positive commands only: the negative side of this valve was identified and is not driven",)
     if is_wired(compensator):
@@ -196,7 +199,8 @@ def signals_in_words(compensator: Compensator) -> list[str]:
     """Return one line for the command, one for each sensor, and what the sensors are in the recordings."""
     signals, u_max_V = compensator.signals, float(compensator.u_max_V)
     units, command = compensator.valve.recorded_units.of_controller, signals.command
-    text = f"command: ADC code {command.zero_code} is zero, {command.full_code} is {units.text(u_max_V, 'g V')}"
+    full_V = u_max_V * SIDES[compensator.valve.side_name(1)]
+    text = f"command: ADC code {command.zero_code} is zero, {command.full_code} is {units.text(full_V, 'g V')}"
     if command.negative_full_code is not None:
         text += f", {command.negative_full_code} is {units.text(-u_max_V, 'g V')}"
     lines = [f"{text}; {_valid(command.valid_codes, signals.code_max, 'fault')}"]
@@ -266,7 +270,7 @@ def hidden_failure(compensator: Compensator, sign: int) -> HiddenFailure | None:
     A threshold that falls with the pressure drop has its largest offset at a reading of none, one that grows at the
     largest reading. Codes that a sound signal never makes give the smallest beta; those of such a failure can not.
     """
-    model, side = compensator.valve.sides[SIDE_NAMES[sign]], compensator.side(sign)
+    model, side = compensator.valve.side(sign), compensator.side(sign)
     if model.trend not in ("increasing", "decreasing"):
         return None
     rising = model.trend == "increasing"
@@ -299,8 +303,8 @@ def refuse_hidden_failures(compensator: Compensator) -> None:
     for sign in compensator.signals.signs:
         hidden = hidden_failure(compensator, sign)
         if hidden is not None:
-            converter = compensator.target.converter if compensator.target else Converter()
+            converter, valve = compensator.target.converter if compensator.target else Converter(), compensator.valve
             raise InputError(
-                f"{hidden.text(compensator.valve.recorded_units.of_side(SIDE_NAMES[sign]))}; take a signal with a live "
+                f"{hidden.text(valve.recorded_units.of_side(valve.side_name(sign)))}; take a signal with a live "
                 f"zero and room above, such as '{live_zero_signal(converter)}', or --accept {ACCEPTED}"
             )

@@ -28,7 +28,6 @@ from dzdesign.design.fixed_offset import fixed_offset, jump, zero_band
 from dzdesign.design.lot_setting import prove_lot
 from dzdesign.design.lot_valves import LotSide
 from dzdesign.design.options import options_of
-from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.ramp_result import TestResult
 
@@ -94,7 +93,7 @@ def _prove_lot_setting(compensator: Compensator, redesigned: Compensator) -> Non
     """
     of_carrier = [each for each in compensator.lot if each.valve_sha256 == compensator.valve_json_sha256]
     for sign in compensator.signals.signs:
-        common, single, name = compensator.side(sign), redesigned.side(sign), SIDE_NAMES[sign]
+        common, single, name = compensator.side(sign), redesigned.side(sign), compensator.valve.side_name(sign)
         drive_range, offset = common.drive_range_over_u_max, common.u_min0_over_u_max
         for place, value, low, high in (
             ("u_min0_over_u_max", offset, Fraction(0), single.u_min0_over_u_max),
@@ -211,7 +210,7 @@ def without_sensors(compensator: Compensator) -> HysteresisChoice:
         for sign in compensator.signals.signs:
             offset = fixed_offset(compensator, sign).share
             drives = jump(offset, Fraction(1), zero_band(compensator, sign))
-            for test in compensator.valve.sides[SIDE_NAMES[sign]].tests:
+            for test in compensator.valve.side(sign).tests:
                 rising = test.recorded.rising
                 at_reading = rising.command_at(compensator.reading_flow_L_min) if rising else None
                 for threshold_V, left in ((test.u_knee_rising_V, onsets), (at_reading, read)):
@@ -225,7 +224,7 @@ def without_sensors(compensator: Compensator) -> HysteresisChoice:
 
 
 def _judged(given: str, made: Compensator) -> HysteresisChoice:
-    tests = [(test, sign) for sign in made.signals.signs for test in made.valve.sides[SIDE_NAMES[sign]].tests]
+    tests = [(test, sign) for sign in made.signals.signs for test in made.valve.side(sign).tests]
     between = [between_tests(made, sign) for sign in made.signals.signs]
     onsets = [left["opening"] for test, sign in tests if "opening" in (left := remaining_dead_zone(made, test, sign))]
     read = [left["opening"] for test, sign in tests if "opening" in (left := read_dead_zone(made, test, sign))]

@@ -110,9 +110,9 @@ def refuse_crossed_branches(side: SideModel) -> None:
 
 def refuse_two_signs(valve: ValveModel, guard: str) -> None:
     """Refuse a command of both signs where a side was not tested, or does not bound the guarded threshold."""
-    if "negative" not in valve.sides:
+    for untested in valve.untested_sides:
         raise InputError(
-            "the command has both signs, but the valve's negative side was not tested; record its ramps, or give a "
+            f"the command has both signs, but the valve's {untested} side was not tested; record its ramps, or give a "
             "command of one sign"
         )
     guards = {name: valve.sides[name].certified for name in ("positive", "negative")}

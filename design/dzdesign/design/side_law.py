@@ -1,6 +1,6 @@
 """The law of one sign of command, its certificate and its uncertainty budget: what `Compensator` is made of."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Annotated, Literal
@@ -9,6 +9,7 @@ from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError, quantity
 from dzdesign.identify.valve.guard_curve import Guard
+from dzdesign.identify.valve.model import ValveModel
 
 Node = Annotated[int, Meta(ge=1, le=2**31)]
 #: How the contributions add, for a person.
@@ -181,9 +182,15 @@ class SideLaw:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sides:
-    """The law of each sign of command."""
+    """The law of each side of the valve that is driven."""
 
-    positive: SideLaw
-    """Law for positive commands."""
+    positive: SideLaw | None = None
+    """Law of the positive side; null for a valve tested with negative commands alone."""
     negative: SideLaw | None = None
-    """Law for negative commands; null for a valve with one solenoid."""
+    """Law of the negative side; null where only the positive one is driven. Where it stands alone, commands from zero
+    to full drive it."""
+
+    @classmethod
+    def of(cls, valve: ValveModel, laws: Mapping[int, SideLaw]) -> "Sides":
+        """Return the laws of a valve's sides, given by the sign of the commands that drive them."""
+        return cls(**{valve.side_name(sign): side for sign, side in laws.items()})

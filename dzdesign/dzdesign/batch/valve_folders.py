@@ -16,6 +16,7 @@ from dzdesign.core.placing import make_folder
 from dzdesign.design.compensator import Compensator
 from dzdesign.identify.valve.model import SIDES, ValveModel
 from dzdesign.identify.valve.test_record import checked_record
+from dzdesign.report.artefacts import laws_of
 from dzdesign.report.lot.folder import is_lot
 from dzdesign.report.lot.summary import (
     AGAIN,
@@ -80,7 +81,7 @@ def table_of_valves(
     `lot_law` is the lot setting, for the cost of it at each valve; `records` what each valve was given as its record,
     for those without a valve.json that has it.
     """
-    both = any(each.compensator and each.compensator.negative for each in valves)
+    both = any(each.compensator and each.compensator.two_sided for each in valves)
     rows: list[dict[str, Cell]] = []
     for each in sorted(valves, key=lambda valve: by_name(valve.name)):
         manifest, own = each.manifest, each.compensator
@@ -88,8 +89,8 @@ def table_of_valves(
         row: dict[str, Cell] = {"name": each.name, "status": manifest.status, "reason": manifest.reason}
         for side in SIDES if both else ("",):
             row |= {column_of(side, column): None for column in SIDE_COLUMNS}
-            if own and not (side == "negative" and own.negative is None):
-                figures = _figures(own, SIDES.get(side, 1), lot_law)
+            if own and (not side or side in laws_of(own)):
+                figures = _figures(own, own.valve.sign_of(side) if side else 1, lot_law)
                 row |= {column_of(side, column): value for column, value in figures.items()}
         row["warnings"] = " ".join(dict.fromkeys(warning.code for warning in standing))
         row["inputs_sha256"] = manifest.inputs_sha256
@@ -114,7 +115,7 @@ def _record(valve: ValveFolder, given: Mapping[str, str]) -> Mapping[str, str]:
 
 def _figures(own: Compensator, sign: int, lot_law: Compensator | None) -> dict[str, Cell]:
     """Return the columns of one side; numbers as valve.json has them."""
-    side = own.valve.sides["positive" if sign > 0 else "negative"]
+    side = own.valve.side(sign)
     test = min(side.tests, key=lambda test: abs((test.dp_MPa or 0.0) - (side.reference.dp_MPa or 0.0)))
     left = {branch: round(100 * max(values), 5) for branch, values in _remaining(own, own, sign).items()}
     curve = side.certified[own.side(sign).certificate.guard]
@@ -133,7 +134,7 @@ def _remaining(own: Compensator, law: Compensator, sign: int) -> dict[str, list[
     """Return the dead zone that a law leaves at each of a valve's tests, by branch, as shares of command."""
     from dzdesign.design.costs_at_tests import remaining_dead_zone
 
-    tests = own.valve.sides["positive" if sign > 0 else "negative"].tests
+    tests = own.valve.side(sign).tests
     left = [remaining_dead_zone(law, test, sign) for test in tests]
     return {branch: [each[branch] for each in left] for branch in left[0]}
 

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Annotated
 from dzdesign.core.artefact_files import check_folder_may_be_written, write_folder
 from dzdesign.core.documents import read_bytes, sha256_of
 from dzdesign.core.errors import InputError, quoted
-from dzdesign.core.options import CHECKS, AnyPath, Option, Paths, Texts, flag_of, paths_of, texts_of
+from dzdesign.core.options import CHECKS, AnyPath, Option, Paths, Text, Texts, flag_of, paths_of, read_options, texts_of
 from dzdesign.core.placing import scratch_folder
 from dzdesign.core.units import parse_quantity
+from dzdesign.design.design_choices import LOOP_WITH_GAIN, read_position_loop
 from dzdesign.stages.recordings import expand
 from dzdesign.terminal.progress import say, stage_progress
 
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from dzdesign.verify.verification import Verification
 
 #: Options that make no sense for an output other than a C firmware, unless its kind takes one.
-OF_FIRMWARE = ("blocks", "plant", "back_pressure", "include", "machine_code", "board_code")
+OF_FIRMWARE = ("blocks", "plant", "back_pressure", "position_loop", "include", "machine_code", "board_code")
 #: No port behind a valve's edge has more.
 LARGEST_BACK_MPA = 100.0
 
@@ -51,6 +52,9 @@ class VerifyArguments:
     back_pressure: Annotated[Texts, Option("P", example="1 MPa")] = ()
     """Pressure behind the metering edge in the closed loop (default: 0 and 1 MPa, or the span that the sensors have
     beside the tested pressure drops). Ramps run at the highest pressure, and failing sensors at each. Repeatable."""
+    position_loop: Annotated[Text, Option("T", example=LOOP_WITH_GAIN, read=read_position_loop)] = None
+    """Lag, delay and velocity gain of a position loop to try with a firmware of two solenoids (default: none; without a
+    gain 80 % of what `design` states)."""
     include: Annotated[Paths, Option("DIR", CHECKS)] = ()
     """Folder of headers for your board files, such as those of your chip. Repeatable."""
     board_code: Annotated[bool, Option(group=CHECKS)] = False
@@ -117,9 +121,11 @@ def verify_firmware(
     from dzdesign.regeneration import regenerated
     from dzdesign.report.valve_report import with_report
     from dzdesign.verify.closed_loop.plant import read_plant
+    from dzdesign.verify.closed_loop.position_loop import PositionLoop
     from dzdesign.verify.verification import SCHEMA, Asked, evidence_manifest
     from dzdesign.verify.verification import verify as verify_folder
 
+    loop = read_options(arguments, ["position_loop"])["position_loop"]
     output, plant, digest = None if arguments.output is None else Path(arguments.output), None, None
     if output is not None:
         check_folder_may_be_written(output, SCHEMA)
@@ -138,6 +144,7 @@ def verify_firmware(
                 return blocks_checked(folder, blocks, code)
 
             asked = Asked(
+                position_loop=loop and PositionLoop(lag_s=loop[0], delay_s=loop[1], gain=loop[2]),
                 plant=plant,
                 plant_source=plant_source,
                 plant_sha256=digest,

@@ -32,8 +32,14 @@ def print_valve(valve: "ValveModel") -> None:
     """Print the thresholds, the largest certified offset, what limits it, and each warning once."""
     if is_verbose():
         tables.print_valve(valve)
-        return
-    console = new_console()
+    else:
+        put_valve(valve, new_console())
+        if valve.warnings:
+            put_line(new_console(), MORE)
+
+
+def put_valve(valve: "ValveModel", console: "Console") -> None:
+    """Put the screen of a valve on a page."""
     for name, side in valve.sides.items():
         _put_side(console, side, "" if len(valve.sides) == 1 else f", {name} side", valve.recorded_units.of_side(name))
     put_line(console, tables.meter_line(valve.meter.floor_L_min, valve.meter.lag_in_words(), valve.recorded_units))
@@ -68,20 +74,25 @@ def _put_side(console: "Console", side: "SideModel", which: str, units: "Recorde
 
 def print_design(compensator: "Compensator") -> None:
     """Print what dead zone and hysteresis remain with each choice, what the certificate covers, and the warnings."""
+    if is_verbose():
+        design_tables.print_design(compensator)
+    else:
+        put_design(compensator, new_console())
+        put_line(new_console(), "More: -v, which also states the price of each choice.")
+
+
+def put_design(compensator: "Compensator", console: "Console") -> None:
+    """Put the screen of a design on a page."""
     from dzdesign.design.costs import design_warnings
     from dzdesign.design.position_loop import in_words
     from dzdesign.design.pressure_inputs import not_covered
     from dzdesign.design.redesign import hysteresis_choices, without_sensors
-    from dzdesign.design.signals import SIDE_NAMES
 
-    if is_verbose():
-        design_tables.print_design(compensator)
-        return
-    console, units = new_console(), compensator.valve.recorded_units
+    units = compensator.valve.recorded_units
     for sign in compensator.signals.signs:
         certificate = compensator.side(sign).certificate
         low, high = (float(end) for end in certificate.dp_MPa)
-        which = "" if compensator.negative is None else f"{SIDE_NAMES[sign]}: "
+        which = f"{compensator.valve.side_name(sign)}: " if compensator.two_sided else ""
         put_line(
             console,
             f"{which}at zero command the output stays below the {100 * certificate.confidence:.6g} % bound of the "
@@ -96,7 +107,6 @@ def print_design(compensator: "Compensator") -> None:
         put_line(console, f"not covered: {line}")
     for line in design_warnings(compensator):
         put_line(console, f"warning: {line}")
-    put_line(console, "More: -v, which also states the price of each choice.")
 
 
 def print_result(verification: "Verification | OutputVerification") -> None:
@@ -108,8 +118,13 @@ def print_result(verification: "Verification | OutputVerification") -> None:
 
     if is_verbose() or not isinstance(verification, Verification):
         evidence_tables.print_result(verification)
-        return
-    console, evidence = new_console(), verification.evidence
+    else:
+        put_result(verification, new_console())
+
+
+def put_result(verification: "Verification", console: "Console") -> None:
+    """Put the screen of a firmware's verification on a page."""
+    evidence = verification.evidence
     for check in evidence.checks:
         if check.holds is not True:
             put_line(console, f"{verdict_words(check.holds)}  {check.name}: {check.text}")
@@ -178,8 +193,6 @@ def _put_warnings(console: "Console", warnings: "Iterable[Warning_]") -> None:
     for code, count in counts.items():
         times = f" ({count})" if count > 1 else ""
         put_line(console, _shortened(f"warning [{code}]{times} {first[code]}"))
-    if counts:
-        put_line(console, MORE)
 
 
 def _shortened(text: str) -> str:

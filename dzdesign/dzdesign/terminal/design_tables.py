@@ -52,7 +52,6 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
     from dzdesign.derivation.law import law
     from dzdesign.design.costs import design_warnings, lines_of_tests
     from dzdesign.design.pressure_inputs import signals_in_words
-    from dzdesign.design.signals import SIDE_NAMES
     from dzdesign.report.sections.provenance import remaining_section
 
     chosen, units = law(compensator.law), compensator.valve.recorded_units
@@ -64,7 +63,7 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
         side = compensator.side(sign)
         certificate = side.certificate
         low, high = (float(end) for end in certificate.dp_MPa)
-        label = "" if compensator.negative is None else "positive: " if sign > 0 else "negative: "
+        label = f"{compensator.valve.side_name(sign)}: " if compensator.two_sided else ""
         lines += [
             f"{label}the law's line: u_min0/u_max = {_rational(side.u_min0_over_u_max)} at dP0 ({side.start}), drive "
             f"range of the law k x_max/u_max = {_rational(side.drive_range_over_u_max)} (from there to full output)",
@@ -72,11 +71,11 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
             f"{100 * certificate.confidence:.6g}% lower bound of the {certificate.guard} threshold "
             f"{units.span(low, high, '.3f MPa')}, at every pressure code; "
             + (
-                compensator.valve.sides[SIDE_NAMES[sign]].none_in_words(certificate.guard, units)
+                compensator.valve.side(sign).none_in_words(certificate.guard, units)
                 if certificate.zero_flow_L_min is None
-                else compensator.valve.sides[SIDE_NAMES[sign]].zero_flow_in_words(units)
+                else compensator.valve.side(sign).zero_flow_in_words(units)
             ),
-            f"{label}{compensator.valve.sides[SIDE_NAMES[sign]].between_in_words(certificate.guard)}",
+            f"{label}{compensator.valve.side(sign).between_in_words(certificate.guard)}",
         ]
     if compensator.current_drive is not None:
         lines += compensator.current_drive.in_words(units)

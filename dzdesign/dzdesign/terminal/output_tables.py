@@ -45,7 +45,6 @@ def print_output(output: "Output", console: "Console | None" = None, folder: str
 def _put_setting(console: "Console", compensator: "Compensator", settings: "Mapping[str, str]") -> None:
     """Print what a device is told, and for each side what is left at the tested pressure drops."""
     from dzdesign.codegen.amplifier.files import setting_of, zones_of
-    from dzdesign.design.signals import SIDE_NAMES
 
     setting, units = setting_of(compensator, settings), compensator.valve.recorded_units
     device, zones = setting.device, zones_of(setting, compensator)
@@ -54,7 +53,7 @@ def _put_setting(console: "Console", compensator: "Compensator", settings: "Mapp
         words = f"law at {units.text(float(setting.dp_MPa), '.2f MPa')}"
     put_line(console, f"{device.title}, {device.description}: {words}")
     for sign, offset in setting.offsets.items():
-        side, of_side = SIDE_NAMES[sign], units.of_side(SIDE_NAMES[sign])
+        side, of_side = compensator.valve.side_name(sign), units.of_side(compensator.valve.side_name(sign))
         certificate = compensator.side(sign).certificate
         low, high = (float(end) for end in offset.dp_MPa)
         put_line(

@@ -55,7 +55,7 @@ def test_the_command_line_goes_before_the_file_entry_by_entry(here, capsys):
     assert problems("valve", found) == []
     valve = api.identify("ramp.csv", record={**said, "date": tomllib.loads("d = 2026-01-31")["d"]}, output="api.json")
     assert Path("api.json").read_bytes() == Path("valve.json").read_bytes()
-    assert "<pre" in valve._repr_html_() and "HLP 46" in valve._repr_html_()
+    assert "HLP 46" in valve._repr_html_()
 
 
 def test_no_number_hangs_on_it(here):

@@ -112,6 +112,8 @@ class InputCheck(InputCounts):
 
     sign: Sign
     """Sign of the command."""
+    side: Side
+    """Side of the valve that these commands drive."""
     over_compensated: Count
     """Number of pressure codes in the certified interval whose drive at zero command lies above the bound."""
     smallest_margin_V: Annotated[float, quantity("V", ge=-MOST_V, le=MOST_V)]
@@ -130,11 +132,6 @@ class InputCheck(InputCounts):
     """Check above the tested pressure drops."""
     lot: LotCheck | None
     """For a lot setting, the check of every valve against its own bounds; null for a single valve."""
-
-    @property
-    def side(self) -> Side:
-        """Side of the valve that these commands are for."""
-        return "positive" if self.sign > 0 else "negative"
 
     @property
     def holds(self) -> bool:

@@ -151,6 +151,12 @@ LOAD_STEPS = Requirement(
     title="load steps, and readings stuck during one, were tried in the closed loop",
     how="`verify --plant`",
 )
+#: The front door reads what the user states; a firmware of one solenoid moves a piston one way.
+POSITION_LOOP = Requirement(
+    id="position-loop",
+    title="a position loop of the stated gain comes to rest",
+    how=f"{OF_SOME}for both signs with --position-loop",
+)
 CURRENT_STATES = Requirement(
     id="current-controller", title="the current controller equals its exact model", how=BY_CURRENT
 )

@@ -22,6 +22,7 @@ from dzdesign.verify.closed_loop.compensation import compensates
 from dzdesign.verify.closed_loop.firmware_loop import FirmwareLoop, Watch, close_the_loop
 from dzdesign.verify.closed_loop.loop import RampSequence
 from dzdesign.verify.closed_loop.plant import Plant
+from dzdesign.verify.closed_loop.position_loop import PositionLoop, comes_to_rest
 from dzdesign.verify.closed_loop.ramps import Curves, LoopComparison, csv_of, loop_curves
 from dzdesign.verify.closed_loop.scene import Scene, scenes_of
 from dzdesign.verify.compilation import board_compiles, check_include, compiles_strictly, fits_target_int
@@ -68,6 +69,8 @@ class Asked:
     #: The command over time, and the pressures downstream of the edge.
     sequence: RampSequence = field(default_factory=RampSequence)
     backs_MPa: Sequence[float] | None = None
+    #: A position loop around valve and firmware.
+    position_loop: PositionLoop | None = None
     #: Folders with headers of the user's board files.
     include: Sequence[Path] = ()
     machine_code: bool = False
@@ -183,6 +186,13 @@ def _closed_loop(firmware: Firmware) -> Iterator[Check]:
     yield compare_with_cvodes(scenes, firmware.say)
 
 
+def _position_loop(firmware: Firmware) -> list[Check]:
+    if firmware.asked.position_loop is None:
+        return []
+    firmware.say("closing the position loop")
+    return [comes_to_rest(firmware.asked.position_loop, firmware.loop.scenes)]
+
+
 def _board(firmware: Firmware) -> Sequence[Check]:
     board = board_compiles(firmware.folder, firmware.manifest, firmware.asked.include)
     firmware.board_not_compiled = board.not_compiled
@@ -227,6 +237,7 @@ REQUIREMENTS: tuple[Tried[Firmware], ...] = (
     ),
     Tried((*requirements.OF_CURRENT, requirements.CURRENT_SOLENOIDS), _current, Firmware.runs),
     Tried(requirements.OF_LOOP, _closed_loop, Firmware.runs),
+    Tried((requirements.POSITION_LOOP,), _position_loop, Firmware.runs),
     Tried((requirements.BOARD_FILES,), _board, Firmware.is_as_generated),
     Tried(requirements.OF_GIVEN_LOOP, lambda _: (), lambda _: False),  # the closed loop's run tells of them
     Tried(

@@ -14,7 +14,6 @@ from dzdesign.codegen.banner import banner_of
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareOrigin
 from dzdesign.design.fixed_offset import Characteristic, FixedDeadZone, Node, dead_zones, zero_band
-from dzdesign.design.signals import SIDE_NAMES
 
 NO_NODE: Node = (Fraction(0), Fraction(0))
 #: The table beside the device's file; `verify` has the same name and header.
@@ -226,11 +225,11 @@ def notes_of(setting: AmplifierSetting, compensator: Compensator) -> tuple[str, 
     notes = []
     for sign, offset in setting.offsets.items():
         low, high = (units.text(float(end), ".2f MPa") for end in offset.dp_MPa)
-        trend = compensator.valve.sides[SIDE_NAMES[sign]].trend
+        trend = compensator.valve.side(sign).trend
         outside = LOWER.get(trend, EITHER if offset.dp_MPa[0] < offset.dp_MPa[1] else OTHER)
-        side = "" if len(setting.offsets) == 1 else f"{SIDE_NAMES[sign]} side: "
+        side = "" if len(setting.offsets) == 1 else f"{compensator.valve.side_name(sign)} side: "
         notes.append(side + outside.format(low=low, high=high))
-    if compensator.negative is None and "negative" in compensator.valve.sides:
+    if not compensator.two_sided and len(compensator.valve.sides) > 1:
         notes.append("the valve's negative side is left out: the design's command has one sign")
     if compensator.valve.simulated:
         notes.append("the recordings are simulated: an example, not for a machine")

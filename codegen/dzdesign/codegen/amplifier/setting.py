@@ -20,7 +20,6 @@ from dzdesign.design.fixed_offset import (
     pressure_line,
     zero_band,
 )
-from dzdesign.design.signals import SIDE_NAMES
 
 #: A recorded pressure drop is this near to the one that was meant.
 NEAR = Fraction(1, 100)
@@ -102,6 +101,11 @@ def amplifier_setting(
         signs, is_table, at = compensator.signals.signs, device.law == "table", None
         if len(signs) > 1 and not device.takes_both_signs:
             raise InputError(f"{device.title} drives one solenoid, but the design has two; choose another device")
+        if compensator.positive is None:
+            raise InputError(
+                "an amplifier's setting is that of positive commands, but the valve was tested with negative ones "
+                "alone; record ramp tests with positive commands, or choose another target"
+            )
         offsets = {sign: fixed_offset(compensator, sign) for sign in signs}
         rest = max(zero_band(compensator, sign) for sign in signs) if threshold is None else threshold
         if dp_MPa is not None and not is_table:
@@ -112,7 +116,7 @@ def amplifier_setting(
         if threshold is not None and device.threshold is None and not is_table:
             raise InputError(f"{device.title} has no threshold parameter for --threshold; leave it out")
         if is_table:
-            reference = Fraction(repr(compensator.valve.sides["positive"].reference.dp_MPa))
+            reference = Fraction(repr(compensator.valve.positive.reference.dp_MPa))
             at = _nominal(reference if dp_MPa is None else dp_MPa, offsets)
             parameters, characteristics = dict[str, int](), _table(compensator, device, offsets, at, rest)
         elif device.law == "jump":
@@ -191,7 +195,7 @@ def _full_counts(compensator: Compensator, device: Device, sign: int) -> int:
     if device.full is None:
         _refuse_a_limit(compensator, device)
         return unit
-    tests = compensator.valve.sides[SIDE_NAMES[sign]].tests
+    tests = compensator.valve.side(sign).tests
     drives = [full_drive(compensator, Fraction(repr(test.dp_MPa)), sign) for test in tests]
     limit = floor(_limit(compensator) * unit)
     if limit < device.full.least:

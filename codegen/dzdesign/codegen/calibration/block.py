@@ -26,7 +26,7 @@ from dzdesign.codegen.telemetry.frame import beta_factor
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.current.circuit import CurrentLoop
-from dzdesign.design.signals import SIDE_NAMES, WEIGHT_SHIFT, PressureSignal
+from dzdesign.design.signals import WEIGHT_SHIFT, PressureSignal
 
 #: Nodes that stand for pressures that can't be right.
 FALLBACKS = 2
@@ -39,7 +39,7 @@ def built_for(compensator: Compensator, *, fixed: bool = False) -> BuiltFor:
     """Return what the firmware of a compensator's block is compiled for, or the one with its numbers in it."""
     signals, drive = compensator.signals, compensator.current_drive
     holds = {
-        "BIPOLAR": compensator.negative is not None,
+        "BIPOLAR": compensator.two_sided,
         "FALLING": signals.command.direction(1) < 0,
         **{f"AHEAD_{name}": signals.negative_pair[0] == name for name in "BC"},
         **{f"BEHIND_{name}": signals.negative_pair[1] == name for name in "AC"},
@@ -159,7 +159,7 @@ def _numbers(compensator: Compensator, built: BuiltFor, digest: str, serial: str
         play_noise=functions.play_noise_codes if functions.has_play else 0,
         play_step_shift=_shift(functions.play_step_codes) if functions.has_play else 0,
         play_shift=_shift(functions.play_codes * c.transition_codes) if functions.has_play else 0,
-        sides=(_side(c, 1, built.sizes), _side(c, -1, built.sizes) if c.negative is not None else _nothing(SideBlock)),
+        sides=(_side(c, 1, built.sizes), _side(c, -1, built.sizes) if c.two_sided else _nothing(SideBlock)),
         current=current_block(c.current_drive.loop, built.sizes) if c.current_drive else _nothing(CurrentBlock),
         crc32=0,
     )
@@ -197,7 +197,7 @@ def _side(c: Compensator, sign: int, sizes: Sizes) -> SideBlock:
         beta_factor=factor,
         ramp_up=functions.ramp_up[place] or NO_RAMP,
         ramp_down=functions.ramp_down[place] or NO_RAMP,
-        nodes=_beta_nodes(form, SIDE_NAMES[sign], sizes.node_mask),
+        nodes=_beta_nodes(form, c.valve.side_name(sign), sizes.node_mask),
         node_count=len(side.beta),
         beta_shift=shift,
         span=command.span(sign),

@@ -172,7 +172,7 @@ def _valve_header(page: ValvePage) -> Values:
         "transition_codes": c.transition_codes,
         "sides": [
             {
-                "text": "" if c.negative is None else f"{'Positive' if sign > 0 else 'Negative'} commands. ",
+                "text": f"{'Positive' if sign > 0 else 'Negative'} commands. " if c.two_sided else "",
                 "kappa": f"{_rational(c.side(sign).drive_range_over_u_max)}, {KAPPA_ROUNDING}",
                 "u_min0": f"{_rational(c.side(sign).u_min0_over_u_max)}, {U_MIN0_ROUNDING}",
                 "at_zero": zero_command(c, sign),

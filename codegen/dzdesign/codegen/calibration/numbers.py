@@ -16,7 +16,8 @@ from dzdesign.derivation.law import law
 from dzdesign.derivation.presentation.formulas import to_text
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.drive_functions import RAMP_UNIT
-from dzdesign.design.signals import INPUT_NAMES, SIDE_NAMES
+from dzdesign.design.signals import INPUT_NAMES
+from dzdesign.identify.valve.model import SIDES
 
 SIGNS = (1, -1)
 #: What the elements of an array of structs are.
@@ -24,6 +25,7 @@ ELEMENTS = {
     "sensors": [f"pressure {name}" for name in INPUT_NAMES],
     "sides": ["positive commands", "negative commands"],
 }
+NEGATIVE_ALONE = "commands from zero to full, which drive the valve's negative side"
 
 
 def _element(place: str) -> tuple[str, int]:
@@ -32,14 +34,15 @@ def _element(place: str) -> tuple[str, int]:
     return group, int(index or 0)
 
 
-def _between(before: str, after: str) -> list[str]:
+def _between(before: str, after: str, negative_alone: bool) -> list[str]:
     """Return the lines between the last member of one struct in the block's and the first of another; "" is itself."""
     (left, _), (group, element) = _element(before), _element(after)
     lines = ["    },"] if left in ELEMENTS else []
     if left != group:
         lines += ["},"] if left else []
         lines += [f".{group} = {{"] if group else []
-    return lines + ([f"    {{ /* {ELEMENTS[group][element]} */"] if group in ELEMENTS else [])
+    named = NEGATIVE_ALONE if negative_alone and group == "sides" else ELEMENTS.get(group, [""])[element]
+    return lines + ([f"    {{ /* {named} */"] if group in ELEMENTS else [])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,18 +69,19 @@ class ValvePage:
             if place not in parts or not self.built.keeps(entry):
                 continue
             if place != within:
-                lines += _between(within, place)
+                lines += _between(within, place, self.compensator.positive is None)
                 within = place
             group, element = _element(place)
             sign = SIGNS[element] if group == "sides" else 0
             known = self._sides[sign] if sign else self._current if place == "current" else self._own
             if group == "sensors":
                 known = self._sensors[element]
-            key = entry.key.replace("*", SIDE_NAMES[sign] if sign else INPUT_NAMES[element].lower())
+            valve = self.compensator.valve
+            key = entry.key.replace("*", valve.side_name(sign) if sign else INPUT_NAMES[element].lower())
             indent, value = " " * (8 if group in ELEMENTS else 4 if group else 0), getattr(parts[place], name)
             said = self._comment(entry, known.get(name, ""), key, len(indent) + 4)
             lines += [f"{indent}{line}" for line in (*said, *self._assigned(name, entry, value, sign))]
-        return [*lines, *_between(within, "")]
+        return [*lines, *_between(within, "", False)]
 
     @staticmethod
     def _comment(entry: Words, engineering: str, key: str, indent: int) -> list[str]:
@@ -131,7 +135,7 @@ class ValvePage:
         def reading(code: int) -> str:
             codes = command.direction(1) * (code - command.zero_code)
             sign = 1 if codes >= 0 or len(signals.signs) == 1 else -1
-            return controller.text(codes / command.span(sign) * u_max_V + 0.0, ".4g V")
+            return controller.text(SIDES[c.valve.side_name(1)] * codes / command.span(sign) * u_max_V + 0.0, ".4g V")
 
         for name, code in zip(("zero", "low", "high"), (command.zero_code, *command.valid_codes), strict=True):
             found[f"command_{name}"] = reading(code)
@@ -183,7 +187,8 @@ class ValvePage:
     def _side(self, sign: int) -> dict[str, str]:
         c, side, form = self.compensator, self.compensator.side(sign), integer_form(self.compensator, sign)
         signals, functions, numbers = c.signals, c.drive_functions, self.block.sides[sign < 0]
-        units, u_max_V, place = c.valve.recorded_units.of_side(SIDE_NAMES[sign]), float(c.u_max_V), int(sign < 0)
+        units = c.valve.recorded_units.of_side(c.valve.side_name(sign))
+        u_max_V, place = float(c.u_max_V), int(sign < 0)
         span, chosen, unit = signals.command.span(sign), law(c.law), form.scale_beta * c.beta_denominator
         divisor, whole = form.divisor << form.shift, unit * c.beta_step_codes
         pair = signals.pair(sign)
@@ -225,7 +230,7 @@ class ValvePage:
             "ramp_up": ramp(numbers.ramp_up),
             "ramp_down": ramp(numbers.ramp_down),
             "nodes": f"beta {low:.6f} to {high:.6f}, in 1/{c.beta_denominator}",
-            "span": c.valve.recorded_units.of_controller.text(sign * u_max_V, "g V"),
+            "span": c.valve.recorded_units.of_controller.text(SIDES[c.valve.side_name(sign)] * u_max_V, "g V"),
             "room": self._share(numbers.room, sign),
             "band_end": self._share(c.zero_band_codes, sign),
         }

@@ -7,7 +7,6 @@ from dzdesign.codegen.core.constants import COLUMNS
 from dzdesign.derivation.law import Law
 from dzdesign.design.certificate import above_in_words, below_in_words, taken_off
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.signals import SIDE_NAMES
 
 #: Of the numerators over a power of two, by design/dzdesign/design/designing.py.
 KAPPA_ROUNDING, U_MIN0_ROUNDING = "rounded to nearest", "rounded down with a margin of half a PWM count"
@@ -46,7 +45,7 @@ def certificate_lines(compensator: Compensator, sign: int) -> list[str]:
     certificate, units = compensator.side(sign).certificate, compensator.valve.recorded_units
     low, high = certificate.dp_MPa
     where = units.span(float(low), float(high), ".2f MPa")
-    between = compensator.valve.sides[SIDE_NAMES[sign]].between_in_words(certificate.guard)
+    between = compensator.valve.side(sign).between_in_words(certificate.guard)
     margin = units.text(1e3 * float(certificate.smallest_margin_V), ".3g mV")
     text = (
         f"Certificate of {compensator.certified_of}: {where}, this value lies below the "
@@ -54,9 +53,9 @@ def certificate_lines(compensator: Compensator, sign: int) -> list[str]:
         f"least margin is {margin}, in addition to {_counted(compensator)}."
     )
     if certificate.guard == "closing" and certificate.zero_flow_L_min is not None:
-        text += f" Hence {compensator.valve.sides[SIDE_NAMES[sign]].zero_flow_in_words(units)}."
+        text += f" Hence {compensator.valve.side(sign).zero_flow_in_words(units)}."
     elif certificate.guard == "closing":
-        meter_L_min = compensator.valve.sides[SIDE_NAMES[sign]].certificate.level_L_min
+        meter_L_min = compensator.valve.side(sign).certificate.level_L_min
         by_hand, hidden = certificate.level_L_min < meter_L_min, certificate.level_L_min > meter_L_min
         flow = units.text(certificate.level_L_min, ".3g L/min" if by_hand else ".2f L/min")
         shown = "as the low-flow readings show" if by_hand else "which is less than the recordings can show"
@@ -73,8 +72,8 @@ def certificate_lines(compensator: Compensator, sign: int) -> list[str]:
 
 def _beyond(compensator: Compensator, sign: int) -> str:
     """Return what is certified above the tests, and what there is below them."""
-    certificate, side = compensator.side(sign).certificate, compensator.valve.sides[SIDE_NAMES[sign]]
-    units = compensator.valve.recorded_units.of_side(SIDE_NAMES[sign])
+    certificate, side = compensator.side(sign).certificate, compensator.valve.side(sign)
+    units = compensator.valve.recorded_units.of_side(compensator.valve.side_name(sign))
     above = above_in_words(compensator.above, certificate, side, units)
     below = below_in_words(certificate, side, units)
     return f"{above[0].upper()}{above[1:]}. {below[0].upper()}{below[1:]}."
@@ -88,7 +87,7 @@ def _machine(compensator: Compensator, sign: int) -> str:
             "No machine was declared: the certificate does not cover coil temperature, supply voltage, "
             "pressure sensors, converters beyond rounding, oil or ageing."
         )
-    words = taken_off(budget, compensator.valve.recorded_units.of_side(SIDE_NAMES[sign]))
+    words = taken_off(budget, compensator.valve.recorded_units.of_side(compensator.valve.side_name(sign)))
     return f"{words[0].upper()}{words[1:]}; compensator.json lists all of it."
 
 

@@ -109,7 +109,7 @@ def _certificate(compensator: Compensator) -> str:
     for sign in compensator.signals.signs:
         certificate = compensator.side(sign).certificate
         low, high = (float(end) for end in certificate.dp_MPa)
-        of_sign = "" if len(compensator.signals.signs) == 1 else f" ({SIDE_NAMES[sign]})"
+        of_sign = "" if len(compensator.signals.signs) == 1 else f" ({compensator.valve.side_name(sign)})"
         bound = f"the {100 * certificate.confidence:.6g}% lower bound of the {certificate.guard} threshold"
         parts.append(f"{bound}{of_sign} {units.span(low, high, '.2f MPa')}")
     text = f"At zero command the output lies below {', and below '.join(parts)}, of {compensator.certified_of}."

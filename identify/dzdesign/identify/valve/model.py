@@ -20,6 +20,7 @@ from dzdesign.identify.valve.test_record import LONGEST_NAME, LONGEST_TEXT, MOST
 LONGEST = 4096
 Name = Annotated[str, Meta(min_length=1, max_length=LONGEST)]
 Words = Annotated[str, Meta(max_length=LONGEST)]
+Side = Literal["positive", "negative"]
 #: Both sides, and the sign of the command that opens each.
 SIDES = {"positive": 1, "negative": -1}
 #: How the lag of a flow meter is known, for people.
@@ -128,7 +129,7 @@ class ValveModel(ShownInNotebooks, Artefact):
         Mapping[str, SideModel], Meta(min_length=1, extra_json_schema={"propertyNames": {"enum": list(SIDES)}})
     ]
     """Tested sides of the valve: one or both."""
-    untested_sides: tuple[Literal["positive", "negative"], ...] = field(init=False)
+    untested_sides: tuple[Side, ...] = field(init=False)
     """Sides without a usable recording."""
     warnings: tuple[Warning_, ...]
     """Warnings in descending order of importance."""
@@ -165,6 +166,22 @@ class ValveModel(ShownInNotebooks, Artefact):
             return ""
         peak = self.recorded_units.text(self.dither.peak * self.u_max_V, ".3g dV")
         return f"a dither of {self.dither.in_words()} (±{peak})"
+
+    def side_name(self, sign: int) -> Side:
+        """Return the name of the side that commands of a sign drive.
+
+        Commands from zero to full have the sign 1. They drive the positive side, or the negative one of a valve that
+        was tested with negative commands alone.
+        """
+        return "negative" if sign < 0 or "positive" not in self.sides else "positive"
+
+    def sign_of(self, side: str) -> int:
+        """Return the sign of the commands that drive a side."""
+        return 1 if self.side_name(1) == side else -1
+
+    def side(self, sign: int = 1) -> SideModel:
+        """Return the side that commands of a sign drive; see `side_name`."""
+        return self.sides[self.side_name(sign)]
 
     @property
     def positive(self) -> SideModel:

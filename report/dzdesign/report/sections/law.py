@@ -20,7 +20,6 @@ from dzdesign.design.certificate import above_in_words, below_in_words, reach_of
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.pressure_inputs import signals_in_words
 from dzdesign.design.side_law import ADDED_IN_FULL, Budget, BudgetLine
-from dzdesign.identify.valve.model import SIDES
 from dzdesign.report.artefacts import laws_of
 from dzdesign.report.figure import (
     LIGHT,
@@ -150,7 +149,7 @@ def account_of(law_name: str) -> LawAccount:
 
 def law_figure(compensator: Compensator, name: str, both: bool, hues: PressureHues) -> ReportFigure:
     """Draw the output against the command at the ends of the tested interval, and the threshold's bound."""
-    exact = ExactLaw(compensator, SIDES[name])
+    exact = ExactLaw(compensator, compensator.valve.sign_of(name))
     u_max, certificate = float(compensator.u_max_V), laws_of(compensator)[name].certificate
     units = compensator.valve.recorded_units.of_side(name)
     low, high = map(float, certificate.dp_MPa)

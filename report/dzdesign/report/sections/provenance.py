@@ -13,7 +13,6 @@ from dzdesign.design.costs import lines_of_tests
 from dzdesign.design.costs_at_tests import CostAtTest, costs_at_tests
 from dzdesign.design.firmware_manifest import setting_words
 from dzdesign.design.redesign import without_sensors
-from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.artefacts import ROLES, Chain
 from dzdesign.report.page import (
@@ -142,11 +141,11 @@ def _costs(compensator: Compensator) -> Iterator[tuple[int, Sequence[CostAtTest]
 
 
 def _table(compensator: Compensator, sign: int, costs: Sequence[CostAtTest]) -> Table:
-    units = compensator.valve.recorded_units.of_side(SIDE_NAMES[sign])
+    units = compensator.valve.recorded_units.of_side(compensator.valve.side_name(sign))
     read = units.text(compensator.reading_flow_L_min, ".2f L/min")
     caption = f"Dead zone by design, in per cent of command, at the onset (knee) and read at {read}"
-    if compensator.negative is not None:
-        caption += f"; {SIDE_NAMES[sign]} commands"
+    if compensator.two_sided:
+        caption += f"; {compensator.valve.side_name(sign)} commands"
     columns: list[tuple[str, Callable[[CostAtTest], Cell]]] = [
         in_units("dP", "dp_MPa", ".2f MPa", units),
         in_units("offset", "offset_V", ".3f V", units),

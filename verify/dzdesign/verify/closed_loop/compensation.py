@@ -11,12 +11,10 @@ import numpy as np
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs_at_tests import corners_of, remaining_dead_zone
 from dzdesign.design.redesign import hysteresis_left
-from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.identify.valve.side_model import SideModel
 from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN
 from dzdesign.verify.closed_loop.loop_checks import nearest_test
 from dzdesign.verify.closed_loop.ramps import Curves, zero_command_name
-from dzdesign.verify.closed_loop.scene import SIGNS
 from dzdesign.verify.loop_results import PressureResult
 from dzdesign.verify.requirements import COMPENSATES, Check
 
@@ -48,9 +46,10 @@ def compensates(
 
 def _offset(curves: Mapping[str, Curves], compensator: Compensator, sign: int) -> tuple[bool, str]:
     """Say by how much the drive at zero command lies below what is certified, less what the machine takes."""
-    law, side = compensator.side(sign), compensator.valve.sides[SIDE_NAMES[sign]]
-    at_zero = curves[zero_command_name(SIDE_NAMES[sign])]
-    dp_MPa, units = at_zero["dp_MPa"], compensator.valve.recorded_units.of_side(SIDE_NAMES[sign])
+    law, side = compensator.side(sign), compensator.valve.side(sign)
+    name = compensator.valve.side_name(sign)
+    at_zero, units = curves[zero_command_name(name)], compensator.valve.recorded_units.of_side(name)
+    dp_MPa = at_zero["dp_MPa"]
     certified_V = _one_way(at_zero["bound_V"], side)
     if compensator.below_dp0 == "hold" and side.reference.dp_MPa is not None:
         certified_V = np.interp(np.maximum(dp_MPa, side.reference.dp_MPa), dp_MPa, certified_V)
@@ -81,7 +80,7 @@ def _dead_zone(ramps: Sequence[PressureResult], compensator: Compensator) -> Ite
     """Say by how much the dead zone on opening is longer than stated, or than the law makes it with this plant."""
     found = []
     for ramp in ramps:
-        sign, test = SIGNS[ramp.side], nearest_test(ramp, compensator.valve)
+        sign, test = compensator.valve.sign_of(ramp.side), nearest_test(ramp, compensator.valve)
         corners = corners_of(compensator, compensator.signals.pair(sign).code_at(test.dp_MPa), sign)
         own = max(corners.command_at(ramp.dead_zone_opening), corners.leaves)
         stated = max(remaining_dead_zone(compensator, test, sign).get("opening", 0.0), own)
@@ -97,7 +96,8 @@ def _hysteresis(ramps: Sequence[PressureResult], compensator: Compensator) -> It
     """Say by how much the compensated branches lie further apart than stated, where both were recorded."""
     found = []
     for ramp in ramps:
-        stated = hysteresis_left(compensator, nearest_test(ramp, compensator.valve), SIGNS[ramp.side])
+        sign, test = compensator.valve.sign_of(ramp.side), nearest_test(ramp, compensator.valve)
+        stated = hysteresis_left(compensator, test, sign)
         if stated.size:
             found.append((abs(ramp.hysteresis) - float(np.mean(np.abs(stated))), ramp))
     if found:
@@ -126,7 +126,7 @@ def _full(
     )
     early = min(ramps, key=lambda ramp: ramp.full_from)
     # The top of a dither's wave is cut off sooner, by its peak over the slope of the law's line.
-    slope = float(compensator.side(SIGNS[early.side]).drive_range_over_u_max)
+    slope = float(compensator.side(compensator.valve.sign_of(early.side)).drive_range_over_u_max)
     from_command = FULL_FROM - functions.dither_counts / full / slope
     yield early.full_from >= from_command, (
         f"the output rises up to {early.full_from:.1%} of command (least: {from_command:.1%})"
@@ -148,7 +148,7 @@ def _promised(ramp: PressureResult, curves: Mapping[str, Curves], compensator: C
         here = float(np.interp(ramp.dp_MPa, at_zero["dp_MPa"], drive))
         return 1 - (float(drive.max()) - here) / (1 - here)
     test = nearest_test(ramp, compensator.valve)
-    sign = SIGNS[ramp.side]
+    sign = compensator.valve.sign_of(ramp.side)
     full = corners_of(compensator, compensator.signals.pair(sign).code_at(test.dp_MPa), sign).full
     flow: float = test.recorded.opening.flow_at(np.array([full * u_max_V]))[0] / test.recorded.q_max_L_min
     return flow

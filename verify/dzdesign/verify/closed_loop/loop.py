@@ -1,8 +1,10 @@
 """The compiled core in closed loop with the plant: ramps up and down, the pulse resolved, pressures through the ADC."""
 
 import copy
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from importlib.resources import files
+from math import ceil
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +12,7 @@ import numpy as np
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.drive_functions import RAMP_UNIT
-from dzdesign.design.signals import SIDE_NAMES, Signals
+from dzdesign.design.signals import Signals
 from dzdesign.identify.valve.side_model import SideModel
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant, numbers_of, step_header
 from dzdesign.verify.closed_loop.stand_in import StandIn
@@ -38,6 +40,10 @@ HOLDING_H = 1e6
 FLOATING = ("-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math")
 #: As loop.c has it: choices, series and channels, plant, coil and sensor; the record.
 DZ_LOOP = Function("dz_loop", (*["in"] * 14, "out"))
+#: Of a position loop: choices, numbers, channels of both signs, plant, both characteristics; the positions.
+DZ_POSITION_LOOP = Function("dz_position_loop", (*["in"] * 8, "out"))
+#: Parts of a PWM period in which it is advanced, as loop.c has it.
+PARTS = 4
 #: Of a stand-in: choices, supplies, mean positions, plant, recorded characteristic; the flows.
 DZ_FLOWS = Function("dz_flows", (*["in"] * 5, "out"))
 MODES = ("direct", "compensated", "without beta")
@@ -176,7 +182,7 @@ class ClosedLoop:
         self.coil = CoilLoop.of(compensator) if firmware and compensator else None
         self._corner = self.coil.at() if self.coil else None
         sources |= coil_sources(self.coil)
-        self._library = CompiledLibrary(sources, [DZ_LOOP, DZ_FLOWS], "the closed loop", FLOATING)
+        self._library = CompiledLibrary(sources, [DZ_LOOP, DZ_FLOWS, DZ_POSITION_LOOP], "the closed loop", FLOATING)
         #: Without a compensator no code is read, and any scaling serves.
         self._signals = compensator.signals if compensator else Signals()
         self._negative, self._has_core = sign < 0, firmware is not None
@@ -205,7 +211,7 @@ class ClosedLoop:
         self.slowest_ramp_s = max(ramps_s, default=0.0)
         if functions.interlock_codes is not None:
             self.waits_s = functions.fault_samples / signals.sample_Hz
-        self._side = compensator.valve.sides.get(SIDE_NAMES[sign])
+        self._side = compensator.valve.sides.get(compensator.valve.side_name(sign))
 
     def _with(self, **changes: object) -> "ClosedLoop":
         """Return the same loop with other attributes; nothing is compiled again."""
@@ -288,6 +294,30 @@ class ClosedLoop:
         size = np.array([flows.size], dtype=np.int32)
         self._library.call("dz_flows", size, supply_MPa, 1e-3 * position_mm, plant, self._curve, flows)
         return flows
+
+    def release(
+        self, negative: "ClosedLoop", valves: Sequence[StandIn], samples: int, numbers: Sequence[float], dp_MPa: float
+    ) -> np.ndarray:
+        """Return the positions of a piston that a loop around both sides brings to zero, (samples,).
+
+        `negative` is the loop of negative commands of the same firmware, `valves` are both sides, positive first, and
+        `numbers` as loop.c has them: where the piston is let go and its `struct axis`.
+        """
+        channels, compare_max = (self.channels, negative.channels), self._signals.compare_max
+        waits = ceil(self.waits_s * self._signals.sample_Hz) + 1
+        choices = [samples, waits, compare_max, self._signals.code_max, self.wave[2]]
+        for each in channels:
+            choices += [*each.inputs, each.other_code]
+        zeros, fulls, spans = (
+            np.concatenate([getattr(each, name) for each in channels]) for name in ("zeros", "fulls", "spans")
+        )
+        back_MPa = self.back_within_span(BENCH_BACK_MPA, dp_MPa)
+        plant, position = numbers_of(valves[0].parameters, dp_MPa), np.empty(samples)
+        self._library.call(
+            "dz_position_loop", np.array(choices, dtype=np.int32), np.array([*numbers, back_MPa, dp_MPa]), zeros, fulls,
+            spans, plant, valves[0].table, valves[1].table, position,
+        )  # fmt: skip
+        return position
 
     def run(
         self,

@@ -159,9 +159,7 @@ def no_flow_at_zero(ramps: Sequence[PressureResult], compensator: Compensator, *
     worst, units = max(ramps, key=_zero_flow), compensator.valve.recorded_units
     leakiest = max(ramps, key=lambda ramp: ramp.q_zero_without_beta_L_min)
     guards = {sign: compensator.side(sign).certificate.guard for sign in compensator.signals.signs}
-    sides = compensator.valve.sides
-    identified = {1: sides.get("positive"), -1: sides.get("negative")}
-    chosen = [guard for sign, guard in guards.items() if (side := identified[sign]) and side.certificate.guard != guard]
+    chosen = [guard for sign, guard in guards.items() if compensator.valve.side(sign).certificate.guard != guard]
     if chosen:
         return ZERO_FLOW.check(
             holds=None,

@@ -29,7 +29,6 @@ Ends = tuple[float, float]
 NO_FIGURES: Mapping[str, float] = MappingProxyType({})
 #: Why a scenario is not required, in words of the report.
 NO_CORE_CAN_KNOW = "the firmware cannot detect it"
-SIGNS: dict[Side, int] = {"positive": 1, "negative": -1}
 #: Pressures downstream of the edge where none were given, MPa: a port open to the tank, and a pipe's back pressure.
 BACKS_MPA = (0.0, 1.0)
 #: Digits that mean something, of a flow in L/min, a share, a time in s: the last ones depend on the processor, by whose
@@ -57,7 +56,7 @@ class Scene:
     @property
     def sign(self) -> int:
         """Sign of the commands that drive the side."""
-        return SIGNS[self.side]
+        return self.compensator.valve.sign_of(self.side)
 
     @property
     def identified(self) -> SideModel:
@@ -167,10 +166,8 @@ def scenes_of(
     """
     valve = compensator.valve
     scenes: list[Scene] = []
-    for name, sign in SIGNS.items():
-        if sign not in compensator.signals.signs:
-            continue
-        side = valve.sides[name]
+    for sign in compensator.signals.signs:
+        name, side = valve.side_name(sign), valve.side(sign)
         pressures = side.beta.dp_MPa or tuple(test.dp_MPa for test in side.tests if test.dp_MPa is not None)
         loop = ClosedLoop(plant or stand_in_of(side, valve.u_max_V), folder, compensator, sign)
         for back_MPa in backs_MPa or ():

@@ -115,7 +115,7 @@ def controller_on_machine(folder: Path, compensator: Compensator, machine: Machi
 
 def zero_command_points(compensator: Compensator) -> tuple[int, ...]:
     """Return the set points at zero command at the ends of the tested interval, counts."""
-    signals, ends = compensator.signals, compensator.positive.certificate.dp_MPa
+    signals, ends = compensator.signals, compensator.side().certificate.dp_MPa
     zero = signals.command.zero_code
     return tuple(sorted({compensator.compare(zero, round(signals.pair(1).dp_code(dp))) for dp in ends}))
 

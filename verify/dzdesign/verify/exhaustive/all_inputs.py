@@ -72,6 +72,7 @@ def input_check(prepared: PreparedInputs, core_sha256: str, found: Findings) -> 
         raise RequirementError("no pair of valid pressure codes makes a tested pressure drop, so no bound is known")
     return InputCheck(
         sign=1 if exact.sign > 0 else -1,
+        side=exact.side,
         over_compensated=margin.exceeded,
         smallest_margin_V=float(margin.margin_V),
         core_sha256=core_sha256,
@@ -243,7 +244,7 @@ def check_lot(exact: ExactLaw, found: Differences, at_zero: np.ndarray) -> LotCh
         return None
     bounds = []
     for valve in lot:
-        side = valve.positive if exact.side == "positive" else valve.negative
+        side = valve.side(exact.sign)
         if side is None:
             raise InputError(
                 f"'{valve.name}' of the lot has no bounds of the {exact.side} side; run `dzdesign batch` again"

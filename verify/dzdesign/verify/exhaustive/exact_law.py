@@ -56,7 +56,7 @@ class ExactLaw:
     def __init__(self, compensator: Compensator, sign: int = 1) -> None:
         signals, side, command = compensator.signals, compensator.side(sign), compensator.signals.command
         self.compensator, self.sign = compensator, sign
-        self.side: Side = "positive" if sign > 0 else "negative"
+        self.side: Side = compensator.valve.side_name(sign)
         self.code_max, self.compare_max = signals.code_max, signals.compare_max
         self.compare_limit = compensator.drive_functions.compare_limit
         self.zero = command.zero_code

@@ -59,7 +59,7 @@ LARGEST = 2**62
 
 def guarded_bounds(compensator: Compensator, sign: int) -> LotSide:
     """Return the lower bounds of the threshold that a compensator was certified for."""
-    side = compensator.valve.sides["positive" if sign > 0 else "negative"]
+    side = compensator.valve.side(sign)
     guard = compensator.side(sign).certificate.guard
     if guard not in side.certified:
         raise InputError(

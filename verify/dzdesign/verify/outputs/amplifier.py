@@ -90,7 +90,7 @@ def _safe(device: str, laws: Mapping[int, FileLaw], compensator: Compensator, de
 
 def _bounds_V(compensator: Compensator, sign: int) -> Iterator[Fraction]:
     """Yield the lower bound of the guarded threshold, as the worst machine has it, from the first test to the last."""
-    side = compensator.valve.sides[SIDE_NAMES[sign]]
+    side = compensator.valve.side(sign)
     curve = side.certified[compensator.side(sign).certificate.guard]
     found = [curve.bound()]
     found += [each.bound() for valve in compensator.lot if (each := valve.side(sign)) is not None]
@@ -118,7 +118,7 @@ def _dead_zones(
     """Look for the command at which the drive reaches each knee, and compare it with what was stated."""
     apart: list[float] = []
     for sign in compensator.signals.signs:
-        tests = compensator.valve.sides[SIDE_NAMES[sign]].tests
+        tests = compensator.valve.side(sign).tests
         if len(stated.get(sign, ())) != len(tests):
             text = f"{len(tests)} tests of the {SIDE_NAMES[sign]} side, {len(stated.get(sign, ()))} stated"
             return DEAD_ZONES.check(holds=False, text=text)

@@ -15,7 +15,6 @@ from dzdesign.core.errors import InputError, RequirementError, and_more
 from dzdesign.core.placing import scratch_folder
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import OutputManifest
-from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.verify import requirements
 from dzdesign.verify.closed_loop.loop import BENCH_BACK_MPA, ClosedLoop
 from dzdesign.verify.closed_loop.plant import Plant
@@ -260,7 +259,7 @@ def closed_loop_check(
     try:
         for sign in signals.signs:
             loop = ClosedLoop(plant, firmware, compensator, sign)
-            tests = compensator.valve.sides[SIDE_NAMES[sign]].tests
+            tests = compensator.valve.side(sign).tests
             drops = [test.dp_MPa for test in tests if test.dp_MPa is not None] or [1.0]
             for drop_MPa in sorted({min(drops), max(drops)}):
                 back_MPa = loop.back_within_span(BENCH_BACK_MPA, drop_MPa)

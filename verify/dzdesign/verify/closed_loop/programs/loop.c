@@ -210,6 +210,112 @@ void dz_loop(const int32_t *choices, const double *command, const double *supply
     run(&task, &plant, record);
 }
 
+/* A piston behind a valve of two solenoids, and a P controller of its position: the command that a firmware gets. */
+struct axis
+{
+    double gain;     /* command, a share of full, for a unit of position */
+    double late;     /* samples by which a command is late */
+    double kept;     /* of the spool's distance from its aim over a part of a PWM period */
+    double moves[2]; /* position over the flow, L/min, of such a part, at positive and negative commands */
+};
+
+/* Parts of a PWM period in which spool and piston are advanced. */
+#define PARTS 4
+
+/* A new sample. The pressures are those of the side that it drives: a side that is left loses its pressure drop. */
+static void sample_of_side(const struct task *tasks, const struct plant *valves, struct dz_drive *drive, double command,
+                           uint32_t *seed)
+{
+    const int of_command = command < 0.0;
+    const uint16_t u_code = convert(&tasks[of_command].channels[0], fabs(command), seed);
+    struct dz_drive tried = *drive;
+    int side = drive->side < 0;
+    uint16_t pressures[2];
+
+    read_pressures(&tasks[side], &valves[side], 0, seed, pressures);
+    sample(&tasks[side], &tried, u_code, pressures);
+    if ((tried.side != 0) && ((tried.side < 0) != side)) {
+        side = !side;
+        read_pressures(&tasks[side], &valves[side], 0, seed, pressures);
+    }
+    sample(&tasks[side], drive, u_code, pressures);
+}
+
+/* Advance spool, flows and piston by a PWM period; the spool, a share of full, has a lag of first order. */
+static double moved(const struct axis *axis, struct plant *valves, double aim, double *spool)
+{
+    double way = 0.0;
+
+    for (int part = 0; part < PARTS; part++) {
+        *spool = aim + (*spool - aim) * axis->kept;
+        for (int side = 0; side < 2; side++) {
+            const double *curve = valves[side].curve;
+            const double open = fmax(side ? -*spool : *spool, 0.0);
+
+            curve_flow(&valves[side], open * curve[CURVE_U_MAX_V] / curve[CURVE_V_PER_M]);
+            way += (side ? -1.0 : 1.0) * axis->moves[side] * valves[side].flow;
+        }
+    }
+    return way;
+}
+
+/* choices: samples; of zero command before them; counts of full drive, largest code, whether the plant has the dither in
+ * it; of positive and of negative commands: input ahead, behind, code of another.
+ * numbers: where the piston is let go; `struct axis`; pressure behind the edge, MPa; and at no flow the drop.
+ * zeros, fulls, spans: of both signs; p: of any plant; positive, negative: recorded characteristics.
+ * position[samples]: of the piston, which is to come to zero. */
+void dz_position_loop(const int32_t *choices, const double *numbers, const int32_t *zeros, const int32_t *fulls,
+                      const double *spans, const double *p, const double *positive, const double *negative,
+                      double *position)
+{
+    const struct axis axis = {numbers[1], numbers[2], numbers[3], {numbers[4], numbers[5]}};
+    const double exact[3] = {0.0, 0.0, 0.0};
+    const int32_t shown[2] = {-1, -1};
+    const int32_t late = (int32_t)axis.late;
+    struct plant valves[2];
+    struct task tasks[2] = {{.n = 1}, {.n = 1}};
+    struct dz_drive drive;
+    double spool = 0.0;
+    double aim = 0.0;
+    double at = numbers[0];
+    uint32_t seed = 1u;
+
+    for (int side = 0; side < 2; side++) {
+        struct task *task = &tasks[side];
+
+        task->ahead = choices[5 + 3 * side];
+        task->behind = choices[6 + 3 * side];
+        task->other_code = choices[7 + 3 * side];
+        task->back_MPa = &numbers[6];
+        task->shown = shown;
+        for (int index = 3 * side; index < 3 * side + 3; index++) {
+            task->channels[index - 3 * side] = channel_of(zeros[index], fulls[index], spans[index], choices[3], exact);
+        }
+        plant_at_rest(&valves[side], p, side ? negative : positive, choices[2], numbers[7]);
+    }
+    dz_drive_init(&drive);
+    for (int32_t k = -choices[1]; k < choices[0]; k++) {
+        const double seen = (k < late) ? numbers[0] : position[k - late];
+        const double command = (k < 0) ? 0.0 : fmin(fmax(axis.gain * seen, -1.0), 1.0);
+
+        if (k >= 0) {
+            position[k] = at;
+        }
+        sample_of_side(tasks, valves, &drive, command, &seed);
+        for (uint32_t tick = 0u; tick < DZ_DRIVE_TICKS_PER_SAMPLE; tick++) {
+            const double in_force = aim; /* written in the last period, in force in this one */
+
+            dz_drive_tick(&drive);
+            aim = (double)drive.compare_a - (double)drive.compare_b;
+            if (choices[4]) {
+                aim = (double)drive.side * (double)drive.law;
+            }
+            aim /= (double)choices[2];
+            at -= (k < 0) ? 0.0 : moved(&axis, valves, in_force, &spool);
+        }
+    }
+}
+
 /* The flow of a recorded characteristic at the spool's mean positions, m, in one period after another; n: choices[0]. */
 void dz_flows(const int32_t *choices, const double *supply_MPa, const double *position, const double *p,
               const double *curve, double *flow)
