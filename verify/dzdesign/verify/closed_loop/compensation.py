@@ -57,7 +57,9 @@ def _offset(curves: Mapping[str, Curves], compensator: Compensator, sign: int) -
     if law.budget is not None:  # the bound has the recording's part in it, and the drive a dither's peak
         counted = [line for line in (law.budget.line("recording"), law.budget.line("dither")) if line]
         others_mV = np.array(law.budget.combined_mV) - np.sum([line.contribution_mV for line in counted], axis=0)
-        taken_V = np.interp(dp_MPa, law.budget.dp_MPa, 1e-3 * others_mV)
+        # Between two tests that of either: a reading that is off reaches the one that takes more.
+        right = np.clip(np.searchsorted(law.budget.dp_MPa, dp_MPa), 1, max(len(others_mV) - 1, 1)) % len(others_mV)
+        taken_V = 1e-3 * np.maximum(others_mV[right - 1], others_mV[right])
     below_V = certified_V - taken_V - at_zero["drive_V"]
     worst, allowed_V = int(np.argmax(below_V)), LOWER_OFFSET * float(compensator.u_max_V)
     text = (
