@@ -277,9 +277,11 @@ void dz_drive_sample(struct dz_drive *drive, uint16_t u_adc, uint16_t p_a_adc,
                                ((latched(block, drive->faulty_commands) | latched(block, drive->faulty_pressures)) &
                                 DZ_STATUS_LATCHED));
     if (drive->side > 0) {
-        drive->law = (uint16_t)dz_comp_checked(past, dz_pressure_difference(&block->sides[0], p_a_adc, p_b_adc), held);
+        drive->law = (uint16_t)dz_comp_checked(
+            past, dz_pressure_difference(&block->sides[0], p_a_adc, p_b_adc), held);
     } else if (drive->side < 0) {
-        drive->law = (uint16_t)dz_comp_checked_negative(past, dz_pressure_difference(&block->sides[1], p_b_adc, p_a_adc), held);
+        drive->law = (uint16_t)dz_comp_checked_negative(
+            past, dz_pressure_difference(&block->sides[1], p_b_adc, p_a_adc), held);
     } else {
         drive->law = 0u;
     }
