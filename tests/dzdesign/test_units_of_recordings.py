@@ -21,7 +21,7 @@ from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.artefacts import Chain
 from dzdesign.report.figure import figure_style
 from dzdesign.report.sections.quantities import characteristic_curves, characteristic_quantities
-from dzdesign.report.sections.valve import valve_sections
+from dzdesign.report.sections.valve import conditions_section, thresholds_section
 from dzdesign.report.summary import key_figures
 from tests.support.synthetic import needs_compiler
 
@@ -160,7 +160,9 @@ def test_verify_speaks_of_what_was_recorded(folder, printed):
         assert unit in text, unit
     page = (folder / "evidence" / "report.html").read_text(encoding="utf-8")
     assert "requirements that were checked hold" in page
-    shown = re.sub(r"<style>.*?</style>|href=\"[^\"]*\"", "", page, flags=re.DOTALL)
+    # Options stand as they were given, or in the unit of their default.
+    unshown = r"<style>.*?</style>|href=\"[^\"]*\"|<li>Options of \w+: .*?</li>"
+    shown = re.sub(unshown, "", page, flags=re.DOTALL)
     texts = " | ".join(re.findall(r">([^<>]+)<", shown))
     assert not numbers_as_computed(texts), numbers_as_computed(texts)
     assert not re.search(r"\((mV|V|MPa|L/min)\)", texts)
@@ -212,18 +214,18 @@ def test_plots_are_drawn_in_the_units_of_the_recordings(folder, ramps):
 
 def test_the_report_leads_with_them(valve):
     with figure_style():
-        sections = valve_sections(valve, None)
-    table = sections["thresholds"].tables[0]
+        section = thresholds_section(valve, None, None)
+    table = section.tables[0]
     columns = dict(zip(table.columns, table.rows[0], strict=True))
     assert float(columns["knee opening (mA)"].text) == pytest.approx(OPENS, abs=0.03)
     assert float(columns["dP (bar)"].text) == pytest.approx(10, abs=0.2)
     assert float(columns["slope (gpm/mA)"].text) == pytest.approx(3.5 / 3.785 / 1.6, rel=0.05)
-    figures = [figure for section in sections.values() for figure in section.figures if figure]
+    figures = [figure for figure in section.figures if figure]
     for figure in figures:
         assert not numbers_as_computed(figure.description + figure.caption), figure.name
     assert ">pressure drop dP (bar)<" in figures[0].svg and "(mA)<" in figures[0].svg
     assert "knee_opening_V" in figures[0].csv.splitlines()[0]  # a file is in V
-    assert not numbers_as_computed(" ".join(sections["data"].lines))
+    assert not numbers_as_computed(" ".join(conditions_section(valve, None).lines))
     found = characteristic_quantities(valve, None, (), characteristic_curves(valve, None, {}))
     assert not any(numbers_as_computed(f"{each.value} {each.note}") for each in key_figures(Chain(valve=valve), found))
 
@@ -260,7 +262,7 @@ def test_a_side_whose_reading_falls_counts_outwards(tmp_path):
     negative = next(part for part in text.split("Thresholds")[2:] if "negative side" in part)
     row = next(line for line in negative.splitlines() if "both.csv" in line).split()
     assert float(row[-7]) == pytest.approx(12 - 0.8 * 3.26, abs=0.02)
-    table = valve_sections(valve, None)["thresholds"].tables[1]
+    table = thresholds_section(valve, None, None).tables[1]
     assert float(table.rows[0][1].text) == pytest.approx(12 - 0.8 * 3.26, abs=0.02)
     signal, made = ["--command-signal", "-10..10 V x 0.12 + 1.5 V"], tmp_path / "compensator.json"
     text = run("design", tmp_path / "valve.json", *signal, "-o", made)[1]

@@ -14,16 +14,23 @@ from dzdesign.assess.assessing import assess
 from dzdesign.assess.options import AssessOptions
 from dzdesign.assess.readings import Line, gain_of, hysteresis_of, linearity_of
 from dzdesign.core.recorded_units import AS_COMPUTED, FlowUnit, RecordedUnits
+from dzdesign.design.redesign import without_sensors
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.artefacts import Chain
-from dzdesign.report.figure import figure_style
+from dzdesign.report.figure import PressureHues, figure_style
 from dzdesign.report.sections.characteristic import characteristic_figure, characteristic_section
-from dzdesign.report.sections.closed_loop import scenarios_table
-from dzdesign.report.sections.quantities import characteristic_curves, characteristic_quantities
-from dzdesign.report.sections.valve import RECORDED, conditions_section
-from dzdesign.report.summary import key_figures, measured_figures, unrequired_flow, valve_name
+from dzdesign.report.sections.closed_loop import scenarios_table, worst_of_each
+from dzdesign.report.sections.quantities import (
+    CharacteristicQuantities,
+    Found,
+    PressureQuantities,
+    characteristic_curves,
+    characteristic_quantities,
+)
+from dzdesign.report.sections.valve import RECORDED, certificate_lines, conditions_section
+from dzdesign.report.summary import key_figures, sets_in_words, unrequired_flow, valve_name
 from dzdesign.report.valve_report import REPORT_NAME
 from dzdesign.verify.closed_loop.drive_corners import NOT_DECLARED
 from dzdesign.verify.closed_loop.scene import NO_CORE_CAN_KNOW
@@ -40,31 +47,66 @@ RUN = ScenarioResult(
 )  # fmt: skip
 
 
-def card(label, pressures, compensator=None, *inputs):
-    evidence = evidence_with(closed_loop=replace(LOOP, pressures=pressures), inputs=inputs)
-    chain = Chain(evidence=evidence, compensator=compensator)
-    (found,) = [each for each in key_figures(chain, characteristic_quantities(None, None, pressures, ()))
-                if each.label.startswith(label)]  # fmt: skip
-    return found
-
-
-def test_the_card_of_the_flow_at_zero_speaks_of_beta_only_where_beta_changes_it():
-    unseen = pressure_result(dp_MPa=1.0, unseen_below_L_min=0.6, q_zero_without_beta_L_min=0.3)
-    assert "β" not in card("Flow at zero", (unseen,)).note
-    assert "(β) it would be 0.84 L/min" in card("Flow at zero", (replace(unseen, q_zero_without_beta_L_min=0.84),)).note
-
-
-@needs_compiler
-def test_a_small_margin_says_where_the_reserve_is(example_valve, example_compensator, reported_demo):
-    """Seeded: a margin of 0.000110 mA on the first page looked like no reserve at all."""
-    loops, (inputs,) = (pressure_result(dp_MPa=1.0),), read_evidence(reported_demo / "evidence").inputs
-    of_law = card("Certificate", loops, example_compensator)
-    assert "the statistical reserve is in that offset" in of_law.note
-    of_c = card("Certificate", loops, example_compensator, inputs)
-    assert "C code's output: rounding alone; the statistical reserve is in the bound" in of_c.note
-    assert inputs.smallest_margin_V < example_compensator.positive.certificate.mean_loss_V
+def test_a_margin_says_of_what_it_is_and_where_the_reserve_is(example_valve, example_compensator, reported_demo):
+    """Seeded: a margin of 0.000110 mA looked like no reserve at all."""
+    evidence = read_evidence(reported_demo / "evidence")
+    (of_law,) = certificate_lines(example_compensator, None)
+    assert "the statistical reserve is in that offset" in of_law
+    (of_c,) = certificate_lines(example_compensator, evidence)
+    assert "of the C code: rounding alone; the statistical reserve is in the bound" in of_c
+    assert evidence.inputs[0].smallest_margin_V < example_compensator.positive.certificate.mean_loss_V
     machine = designed(example_valve, coil_temperature="-20..80 degC", supply="18..32 V")
-    assert "lower bound; the statistical reserve is in the bound" in card("Certificate", loops, machine, inputs).note
+    (of_machine,) = certificate_lines(machine, evidence)
+    assert "of the C code; the statistical reserve is in the bound" in of_machine
+
+
+def tiles(chain, found):
+    return {each.label: each for each in key_figures(chain, found)}
+
+
+def quantities(dp_MPa=1.0, **values):
+    """The quantities at one pressure drop: name -> (without, with)."""
+    sets = [{key: Found(pair[at]) for key, pair in values.items()} for at in (0, 1)]
+    return PressureQuantities(side="positive", dp_MPa=dp_MPa, reading_flow_L_min=0.6, before=sets[0], after=sets[1])
+
+
+def of_sets(*pressures):
+    return CharacteristicQuantities(pressures=pressures, before="recorded", after="recorded")
+
+
+def test_a_tile_says_the_worst_of_its_table_and_a_dead_zone_is_read_where_all_are_seen():
+    hidden = {"onset_opening": (50.0, None), "dead_zone_opening": (52.0, 3.0)}
+    seen = {"onset_opening": (48.0, 1.0), "dead_zone_opening": (53.0, 2.0)}
+    one = quantities(largest_flow=(10.0, 9.0), hysteresis=(1.0, 2.0), **hidden)
+    other = quantities(2.0, largest_flow=(20.0, 20.0), hysteresis=(1.5, 1.0), **seen)
+    found = tiles(Chain(), of_sets(one, other))
+    assert found["Dead zone on opening"].value == "53.0 % → 3.0 %"
+    assert "at the reading flow" in found["Dead zone on opening"].note
+    assert found["Largest flow"].value == "20.0 → 20.0 L/min"
+    assert "at least 90.0\u00a0% remains" in found["Largest flow"].note
+    assert found["Hysteresis"].value == "1.5 % → 2.0 %"
+    assert "Flow at zero command" not in found
+    assert "onset" in tiles(Chain(), of_sets(other))["Dead zone on opening"].note
+
+
+def test_a_fixed_offset_stands_beside_the_dead_zone_that_the_law_leaves(example_compensator):
+    found = of_sets(quantities(onset_opening=(50.0, 1.0)))
+    fixed = without_sensors(example_compensator).onset
+    tile = tiles(Chain(compensator=example_compensator), found)["Dead zone on opening"]
+    assert tile.beside == f"fixed MIN offset: {100 * fixed:.1f} %" and fixed > 0.02
+    assert tiles(Chain(), found)["Dead zone on opening"].beside == ""
+
+
+@pytest.mark.parametrize(("flow", "value", "kind"), [(0.0, "none", "text"), (0.7, "0.7 L/min", "bad")])
+def test_a_flow_at_zero_command_in_the_loop_is_loud(flow, value, kind):
+    loop = pressure_result(dp_MPa=1.0, q_zero_L_min=flow)
+    evidence = evidence_with(closed_loop=replace(LOOP, pressures=(loop,)))
+    found = CharacteristicQuantities(pressures=(quantities(flow_at_zero=(None, flow)),), before=None, after="simulated")
+    tile = tiles(Chain(evidence=evidence), found)["Flow at zero command"]
+    assert (tile.value, tile.kind) == (value, kind)
+    assert sets_in_words(found, AS_COMPUTED) == (
+        "With the compensator (simulated closed loop); at 1.00 MPa, the one pressure drop tested."
+    )
 
 
 def test_the_flow_at_zero_that_was_recorded_stands_before_the_simulated_one(example_valve):
@@ -87,10 +129,11 @@ def test_rows_of_one_scenario_say_which_runs_they_are_of():
     """Seeded: one name stood twice, once required and once not."""
     unknown = {"must_shut": False, "not_required": NO_CORE_CAN_KNOW}
     runs = [RUN, *(replace(RUN, dp_MPa=dp, **unknown) for dp in (4.0, 2.0)), replace(RUN, name="load step")]
-    found = [(row[0].text, row[0].more) for row in scenarios_table(runs, AS_COMPUTED).rows]
+    found = [(row[0].text, row[0].more) for row in scenarios_table(runs, worst_of_each(runs), AS_COMPUTED).rows]
     assert found == [(RUN.name, "at 1.00 MPa"), (RUN.name, "at 2.00, 4.00 MPa"), ("load step", "")]
     other = [replace(each, side="negative") for each in runs[:2]]
-    found = [row[0].more for row in scenarios_table([*runs, *other], AS_COMPUTED).rows]
+    every = [*runs, *other]
+    found = [row[0].more for row in scenarios_table(every, worst_of_each(every), AS_COMPUTED).rows]
     assert found == [
         "positive commands, at 1.00 MPa; negative commands, at 1.00 MPa",
         "positive commands, at 2.00, 4.00 MPa; negative commands, at 4.00 MPa",
@@ -210,12 +253,12 @@ def test_a_branch_of_the_loop_is_cut_at_the_top_and_rises():
 def test_all_that_is_drawn_stands_in_the_table_behind_the_figure(valve):
     curves = characteristic_curves(valve, None, {"closed_loop_positive.csv": CURVES_OF_LOOP})
     with figure_style():
-        figure = characteristic_figure(curves, AS_COMPUTED)
+        figure = characteristic_figure(curves, AS_COMPUTED, PressureHues(()))
     rows = list(csv.DictReader(io.StringIO(figure.csv)))
     drawn = sum(points.command.size for curve in curves for points in (*curve.branches.values(), *curve.samples))
     assert len(rows) == drawn
     assert {row["what"] for row in rows} == {"opening", "closing", "sample"}
-    assert characteristic_figure((), AS_COMPUTED) is None
+    assert characteristic_figure((), AS_COMPUTED, PressureHues(())) is None
     assert "No negative commands were tested" in figure.caption
 
 
@@ -263,9 +306,9 @@ def test_measured_values_lead_and_limits_stand_beside_what_they_limit(straight_v
     assert rows["Hysteresis"][-1].text == "✗ fail" and rows["Hysteresis"][2].kind == "bad"
     assert rows["Dead zone at the reading flow, opening"][-1].text == "✓ pass"
     assert rows["Linearity"][-1].text == ""
-    labels = [figure.label for figure in measured_figures(limited)]
-    assert labels[:2] == ["Dead zone on opening, measured", "Dead zone on closing, measured"]
-    assert measured_figures(None) == ()
+    said = sets_in_words(found, AS_COMPUTED)
+    assert said.startswith("Without → with the compensator (recorded → recorded); at 1.00 MPa")
+    assert key_figures(Chain(), characteristic_quantities(None, None, (), ())) == ()
 
 
 def test_flows_stand_in_the_units_of_the_recordings(straight_valve):

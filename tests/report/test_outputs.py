@@ -169,6 +169,14 @@ def test_the_page_lists_them_and_the_command_leaves_the_output_as_it_is(folder, 
     assert document["other_outputs"] == []
 
 
+def test_no_count_of_inputs_stands_where_none_was_tried():
+    """Seeded: a tick stood beside "0 inputs tried"."""
+    right = replace(RIGHT, evidence="e.json")
+    made = MadeOutputs(listed=(right, replace(right, inputs=INPUTS)))
+    cells = [row[-1] for row in outputs_sections(Chain(), made)["outputs"].tables[0].rows]
+    assert [cell.more for cell in cells] == ["e.json", "1\u202f234\u202f567 inputs tried; e.json"]
+
+
 WRONG = MadeOutput(kind="fmu", settings="", place="fmu/", sha256="0" * 64, holds=False, fault="inputs: 3 wrong")
 
 
@@ -184,7 +192,7 @@ ITSELF = replace(FIRMWARE, places={"firmware": Place("fmu/manifest.json", WRONG.
         ("good", WRONG, FIRMWARE, "bad", "1 output NOT to be used: fmu/. as it was"),
         ("open", WRONG, FIRMWARE, "bad", "1 output NOT to be used: fmu/. as it was"),
         ("bad", WRONG, FIRMWARE, "bad", "as it was"),
-        ("good", UNTRIED, FIRMWARE, "open", "NOT VERIFIED: fmu/. as it was"),
+        ("good", UNTRIED, FIRMWARE, "good", "as it was"),
         ("open", UNTRIED, FIRMWARE, "open", "as it was"),
         ("good", UNTRIED, ITSELF, "good", "as it was"),
         ("bad", WRONG, ITSELF, "bad", "as it was"),
@@ -194,11 +202,14 @@ ITSELF = replace(FIRMWARE, places={"firmware": Place("fmu/manifest.json", WRONG.
     ],
 )
 def test_the_verdict_speaks_of_the_outputs(kind, listed, chain, found, text):
-    """A wrong output takes it, one that was not verified makes it open; the firmware of the report is judged once."""
+    """A wrong output takes it, one that was not verified has a line of its own; the firmware of the report is judged
+    once."""
     said = Headline(kind=kind, text="as it was", reasons=("one",), cautions=("SIMULATED",))
     made = MadeOutputs(listed=(listed,) if listed else ())
     judged = with_outputs(said, made, chain)
-    assert (judged.kind, judged.text, judged.cautions) == (found, text, ("SIMULATED",))
+    own = listed is UNTRIED and chain is FIRMWARE
+    line = ("NOT VERIFIED: fmu/ (fmu): `dzdesign verify fmu -o fmu_evidence`",) if own else ()
+    assert (judged.kind, judged.text, judged.cautions) == (found, text, ("SIMULATED", *line))
     wrong = listed is WRONG and chain is FIRMWARE
     assert ("DOES NOT HOLD: fmu/ (fmu): inputs: 3 wrong" in judged.reasons) is wrong
     assert (outputs_sections(chain, made) == {}) is (listed is None or chain is ITSELF)

@@ -14,17 +14,16 @@ from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.design.designing import design
 from dzdesign.identify.identification import identify
 from dzdesign.report.artefacts import Chain, Place, read_chain
-from dzdesign.report.figure import PALETTE, figure_style
+from dzdesign.report.figure import PALETTE, PressureHues, figure_style
 from dzdesign.report.page import LARGEST_LOGO, logo_uri, whole
-from dzdesign.report.sections.closed_loop import loop_section
+from dzdesign.report.sections.closed_loop import loop_section, plant_section
 from dzdesign.report.sections.inputs import inputs_section
-from dzdesign.report.sections.quantities import characteristic_quantities
-from dzdesign.report.sections.valve import valve_sections
-from dzdesign.report.summary import headline, key_figures, worst_of
+from dzdesign.report.sections.quantities import PressureQuantities
+from dzdesign.report.sections.valve import conditions_section, thresholds_section
+from dzdesign.report.summary import headline, worst_of
 from dzdesign.report.valve_report import REPORT_NAME, make_report
 from dzdesign.verify.closed_loop.plant import Plant
 from dzdesign.verify.requirements import AS_STATED
-from tests.support.evidence import pressure_result
 from tests.support.html_pages import HOSTILE, Page
 from tests.support.synthetic import Truth, needs_compiler, synthetic_ramp
 
@@ -46,14 +45,18 @@ def test_the_verdict_and_the_numbers_that_matter_come_first(html, reported_demo)
     evidence = json.loads((reported_demo / "evidence" / "verification.json").read_bytes())
     loops, identified = evidence["closed_loop"]["pressures"], json.loads((reported_demo / "valve.json").read_bytes())
     head = html[: html.index('<section id="characteristic">')]
+    low, high = (identified["sides"]["positive"]["tests"][at]["dp_MPa"] for at in (0, -1))
+    assert f"</span> No flow at zero command from {low:.3g} to {high:.3g} MPa, 99 %</p>" in head
     checked = f"All {len(evidence['checks'])} requirements that were checked hold"
-    assert f"{checked}; the certificate covers the valve as recorded; {AS_STATED}<" in head
-    assert "no machine was declared" in head and "Certificate of the valve as recorded<" in head
+    assert f"{checked}; " in head and f"; {AS_STATED}.</p>" in head and "counts as no flow" in head
+    assert "The certificate covers the valve as recorded: no machine was declared" in head
     # Recorded, not simulated, without the compensator: as in the table of the characteristic.
     before = 10 * max(each["u_onset_rising_V"] for each in identified["sides"]["positive"]["tests"])
     after = 100 * max(each["residual_opening"] for each in loops)
-    assert f"{before:.1f} % → {after:.1f} %" in head and "without (simulated recordings) → with (simulated" in head
-    assert whole(evidence["inputs"][0]["inputs"]) in head and "99 %" in head and "Flow at zero command" in head
+    assert f"{before:.1f} % → {after:.1f} %" in head
+    assert whole(evidence["inputs"][0]["inputs"]) in head
+    labels = re.findall(r"<dt>(.*?)</dt>", head)
+    assert labels == ["Dead zone on opening", "Largest flow", "Hysteresis", "Flow at zero command"]
 
 
 def test_every_section_is_there_with_its_figures_and_tables(html):
@@ -61,10 +64,10 @@ def test_every_section_is_there_with_its_figures_and_tables(html):
     ids = [attributes["id"] for _, attributes in page.tags if "id" in attributes]
     assert len(ids) == len(set(ids))
     assert re.findall(r'<section id="(\w+)">', html) == [
-        "characteristic", "conditions", "loop", "thresholds", "beta", "remaining", "checks", "warnings",
-        "data", "budget", "law", "integers", "inputs", "provenance",
+        "characteristic", "loop", "thresholds", "conditions", "warnings", "checks", "remaining", "budget", "inputs",
+        "plant", "law", "provenance",
     ]  # fmt: skip
-    figures = ("loop", "thresholds", "beta", "law", "map", "zero")
+    figures = ("loop", "thresholds", "zero", "law")
     of_sections = [f"figure-{name}-positive" for name in figures]
     assert ["figure-characteristic", *of_sections] == [name for name in ids if name.startswith("figure-")]
     links = [each["href"] for each in page.of("a")]
@@ -87,11 +90,11 @@ def test_the_page_needs_nothing_from_outside_and_runs_nothing(html):
 
 def test_the_numbers_of_every_figure_can_be_downloaded(html, reported_demo):
     links = {each["download"]: each["href"] for each in Page(html).of("a") if "download" in each}
-    assert len(links) == 8  # seven figures, and the budget's components
+    assert len(links) == 6  # five figures, and the budget's components
     tables = {name: unquote(link.removeprefix("data:text/csv;charset=utf-8,")) for name, link in links.items()}
     evidence = reported_demo / "evidence"
     assert tables["loop-positive.csv"] == (evidence / "closed_loop_positive.csv").read_text()
-    assert tables["map-positive.csv"] == (evidence / "input_map_positive.csv").read_text()
+    assert tables["zero-positive.csv"] == (evidence / "zero_command_positive.csv").read_text()
     for name, text in tables.items():
         lines = text.splitlines()
         assert len(lines) > 2, name
@@ -101,7 +104,7 @@ def test_the_numbers_of_every_figure_can_be_downloaded(html, reported_demo):
 
 def test_figures_take_their_colours_from_the_page(html):
     drawings = re.findall(r'<svg [^>]*class="drawing".*?</svg>', html, re.DOTALL)
-    assert len(drawings) == 7
+    assert len(drawings) == 5
     light = {shade for shade, _ in PALETTE.values()}
     for drawing in drawings:
         assert not {shade for shade in light if shade in drawing}
@@ -131,7 +134,6 @@ def test_a_requirement_that_does_not_hold_is_loud_and_what_was_not_checked_is_no
     seen = replace(chain, evidence=replace(chain.evidence, inputs=(inputs,)))
     with figure_style():
         assert "First wrong: command code 9." in inputs_section(seen).lines
-    assert {"7 wrong"} & {each.value for each in key_figures(seen, characteristic_quantities(None, None, (), ()))}
 
 
 def test_what_was_not_tried_is_said(chain):
@@ -146,9 +148,10 @@ def test_what_was_not_tried_is_said(chain):
     said = " ".join(headline(replace(chain, evidence=evidence)).untried)
     assert "machine's plant" not in said and "machine code" not in said and "the drive follows its model" in said
     with figure_style():
-        section = loop_section(replace(chain, evidence=evidence))
+        section = loop_section(replace(chain, evidence=evidence), PressureHues(()))
     assert f"SHA-256 {'5' * 64}" in section.lines[0]
-    assert any(cell.text == "m_e_kg" for table in section.tables if table for row in table.rows for cell in row)
+    (table, *_) = plant_section(evidence).tables
+    assert any(cell.text == "m_e_kg" for row in table.rows for cell in row)
 
 
 # --- hostile text -------------------------------------------------------------------------------------------------
@@ -194,22 +197,22 @@ def test_one_ramp_test_is_one_and_figures_of_two_sides_say_which_they_are_of(cha
     one, other = (synthetic_ramp(dp, Truth(), seed=7, rate_Hz=10.0) for dp in (1.0, 4.0))
     mirrored = [replace(test, source=f"minus_{test.source}", u=-test.u, q=-test.q) for test in (one, other)]
     alone = identify([one])
+    valves = (alone, identify([one, other, *mirrored]))
     with figure_style():
-        of_one, of_both = (valve_sections(valve, None) for valve in (alone, identify([one, other, *mirrored])))
-    (figure,) = of_one["thresholds"].figures
-    assert of_one["data"].lines[0].startswith("1 ramp test; full command")
-    assert "One pressure drop was tested, and nothing is certified at another." in figure.caption
-    assert "commands</text>" not in figure.svg
-    for side, drawn in zip(("positive", "negative"), of_both["thresholds"].figures, strict=True):
+        of_one, of_both = (thresholds_section(valve, None, None) for valve in valves)
+    data = conditions_section(alone, None).lines
+    assert data[0].startswith("1 ramp test; full command")
+    assert of_one.figures == [None] and "nothing is certified at another" in of_one.lines[0]
+    for side, drawn in zip(("positive", "negative"), of_both.figures, strict=True):
         assert drawn.name == f"thresholds-{side}" and f"{side} commands</text>" in drawn.svg
-    # An assumed repeatability stands beside the certificate.
-    nothing = characteristic_quantities(None, None, (), ())
-    notes = [
-        next(each.note for each in key_figures(of, nothing) if each.label.startswith("Certificate"))
+    assert of_both.lines[0].startswith("Premise, both sides: 2 pressure drops were tested")
+    # An assumed repeatability stands with the verdict.
+    said = [
+        " ".join(headline(of).cautions)
         for of in (Chain(compensator=design(alone), valve=alone), replace(chain, evidence=None))
     ]
-    assert "repeats to 25 mV" in notes[0] and "(assumed-scatter)" in notes[0] and "assumed-scatter" not in notes[1]
-    assert any("from ramp to ramp: standard deviation 25.0 mV (assumed" in line for line in of_one["data"].lines)
+    assert "repeats to 25 mV" in said[0] and "(assumed-scatter)" in said[0] and "assumed-scatter" not in said[1]
+    assert any("from ramp to ramp: standard deviation 25.0 mV (assumed" in line for line in data)
 
 
 @pytest.mark.parametrize(
@@ -223,7 +226,11 @@ def test_one_ramp_test_is_one_and_figures_of_two_sides_say_which_they_are_of(cha
     ],
 )
 def test_of_how_many_runs_a_figure_is_the_worst(sides, said):
-    runs = [pressure_result(side=side, dp_MPa=1.0 + n) for side, count in sides.items() for n in range(count)]
+    runs = [
+        PressureQuantities(side=side, dp_MPa=1.0 + n, reading_flow_L_min=0.6, before={}, after={})
+        for side, count in sides.items()
+        for n in range(count)
+    ]
     assert worst_of(runs, AS_COMPUTED) == said
 
 

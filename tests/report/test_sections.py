@@ -15,14 +15,15 @@ from dzdesign.design.certificate import not_counted
 from dzdesign.design.costs import lines_of_tests
 from dzdesign.design.costs_at_tests import costs_at_tests
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.report.figure import figure_style
+from dzdesign.report.artefacts import Chain
+from dzdesign.report.figure import PressureHues, figure_style
 from dzdesign.report.page import Headline, Page, _cell, _finding, _tied, render
 from dzdesign.report.sections.characteristic import characteristic_figure, characteristic_section
 from dzdesign.report.sections.closed_loop import current_tables
 from dzdesign.report.sections.law import budget_section
 from dzdesign.report.sections.provenance import other_costs, remaining_section
 from dzdesign.report.sections.quantities import characteristic_curves, characteristic_quantities
-from dzdesign.report.summary import measured_figures, with_span
+from dzdesign.report.summary import key_figures, sets_in_words
 from dzdesign.verify.current.results import (
     ControllerStates,
     CurrentCorner,
@@ -135,34 +136,33 @@ def rows_of(assessment):
     }
 
 
-def test_a_measured_card_says_the_worst_that_its_table_shows(two_sides):
-    rows = rows_of(two_sides)
-    for branch, figure in zip(("opening", "closing"), measured_figures(two_sides), strict=False):
-        cells = [text for (_, name), row in rows.items() if name == f"Dead zone at the reading flow, {branch}"
-                 for text in row]  # fmt: skip
-        before, after = (max(float(text.split(" → ")[place]) for text in cells) for place in (0, 1))
-        assert figure.value == f"{before:.1f} % → {after:.1f} %" and "at the reading flow" in figure.note
-        assert "the worst of 2 pressure drops on each side" in figure.note
+def measured_tiles(assessment):
+    found = characteristic_quantities(None, assessment, (), ())
+    return {each.label: each for each in key_figures(Chain(assessment=assessment), found)}
 
 
-def test_a_flow_that_the_meter_hides_has_a_card_with_its_bound(two_sides):
+def test_a_measured_tile_says_the_worst_that_its_table_shows(two_sides):
+    figure, name = measured_tiles(two_sides)["Dead zone on opening"], "Dead zone at the reading flow, opening"
+    cells = [text for (_, of), row in rows_of(two_sides).items() if of == name for text in row]
+    before, after = (max(float(text.split(" → ")[place]) for text in cells) for place in (0, 1))
+    assert figure.value == f"{before:.1f} % → {after:.1f} %" and "at the reading flow" in figure.note
+    found = characteristic_quantities(None, two_sides, (), ())
+    assert "the worst of 2 pressure drops on each side" in sets_in_words(found, AS_COMPUTED)
+
+
+def test_a_flow_that_the_meter_hides_has_a_tile_with_its_bound(two_sides):
     """Seeded: a card of values alone left out the flow at zero command of every meter with a floor."""
-    (card,) = [each for each in measured_figures(two_sides) if each.label.startswith("Flow at zero")]
+    tile = measured_tiles(two_sides)["Flow at zero command"]
     cells = [text for (_, name), row in rows_of(two_sides).items() if name == "Flow at zero command" for text in row]
     bounds = [text.partition(" → ≤")[2] for text in cells]
-    assert len(bounds) == 4 and all(bounds) and card.value == f"≤ {max(bounds, key=float)} L/min"
-    assert "the meter shows none" in card.note
+    assert len(bounds) == 4 and all(bounds) and tile.value == f"≤ {max(bounds, key=float)} L/min"
+    assert "the recordings do not show" in tile.note
 
 
 def test_what_was_recorded_without_the_compensator_alone_has_a_dash_for_with():
     rows = rows_of(assessed(after_dp=(1.0,)))
     one, other = rows["positive", "Hysteresis"][:2]
     assert " → " in one and not one.endswith("–") and other.endswith(" → –")
-
-
-@pytest.mark.parametrize(("values", "text"), [((1.81, 1.83), ""), ((1.8, 2.0), ". With: 1.8 to 2.0 %"), ((2.0,), "")])
-def test_a_range_whose_ends_read_alike_is_none(values, text):
-    assert with_span(values) == text
 
 
 def test_what_a_design_leaves_stands_in_a_table_and_nowhere_twice(example_compensator):
@@ -229,7 +229,7 @@ def label_places(svg):
 def test_the_pressure_drops_of_negative_commands_stand_outside_the_curves(two_sides):
     """Left of the tick of -100 %, where every curve ends."""
     with figure_style():
-        figure = characteristic_figure(characteristic_curves(None, two_sides, {}), AS_COMPUTED)
+        figure = characteristic_figure(characteristic_curves(None, two_sides, {}), AS_COMPUTED, PressureHues(()))
     places = label_places(figure.svg)
     end = next(x for x, text in places if text == "−100")
     labels = [x for x, text in places if text == "4.00"]

@@ -13,7 +13,7 @@ from dzdesign.assess.flow_curves import CELL, ZERO, FlowCurve, PressureCurves
 from dzdesign.assess.quantities import Reading, hidden, in_units, observed
 from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
 from dzdesign.identify.constants import L_MIN
-from dzdesign.identify.knees.gated_line import GATE, fit_line
+from dzdesign.identify.knees.gated_line import GATE, straight_line
 from dzdesign.identify.knees.profile import crossing
 from dzdesign.identify.ramps.medians import median
 from dzdesign.identify.valve.reading_flow import ideal_line
@@ -190,7 +190,7 @@ def _command_at(curve: FlowCurve, level: float) -> tuple[float, float]:
     near = slice(max(right - NEAR, 0), right + NEAR)
     if curve.u[near].size < 2 * NEAR or step > 2 * CELL * curve.u[-1]:
         return at, step
-    slope, zero = fit_line(curve.u[near], curve.q[near])
+    slope, zero = straight_line(curve.u[near], curve.q[near])
     if not slope > 0:
         return at, step
     on_line = float(np.clip(zero + level / slope, at - step, at + step))

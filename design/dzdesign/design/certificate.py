@@ -221,12 +221,12 @@ def reach_of_certificate(compensator: Compensator) -> str:
             "The certificate covers the valve as recorded: no machine was declared, so coil temperature, "
             "supply voltage, pressure sensors, oil and ageing are not counted."
         )
-    parts = []
+    sides: dict[str, list[str]] = {}
     for sign in compensator.signals.signs:
         budget, name = compensator.side(sign).budget, compensator.valve.side_name(sign)
-        side = f"{name} commands: " if compensator.two_sided else ""
         if budget is not None:
-            parts.append(side + taken_off(budget, compensator.valve.recorded_units.of_side(name)))
+            sides.setdefault(taken_off(budget, compensator.valve.recorded_units.of_side(name)), []).append(name)
+    parts = [f"{names[0]} commands: {text}" if len(sides) > 1 else text for text, names in sides.items()]
     return f"The certificate covers the valve as recorded and the declared machine: {'; '.join(parts)}."
 
 

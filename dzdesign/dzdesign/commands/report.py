@@ -13,6 +13,7 @@ Arguments = ReportArguments
 EXAMPLES = (
     "dzdesign report evidence",
     "dzdesign report evidence --firmware firmware -o for_review.html",
+    "dzdesign report evidence --full -o report_in_full.html",
     "dzdesign report calibrated",
 )
 

@@ -1,4 +1,4 @@
-"""`Reproduction`: the paper's numbers beside ours, the artefact reproduction.json. `dzdesign reproduce` fills it."""
+"""`Reproduction`: the paper's numbers against its law, and the product on its valves: reproduction.json."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,16 +13,12 @@ from dzdesign.verify.closed_loop.simulated_recordings import Bench
 LARGEST = 1e12
 Number = Annotated[float, Meta(ge=-LARGEST, le=LARGEST)]
 Hash = Annotated[str, Meta(pattern="^[0-9a-f]{64}$", max_length=64)]
-#: Bare valve, or the whole product on it.
-Driver = Literal["valve", "product"]
-#: How a printed number stands to ours: it went into the fit, or ours is a prediction.
-Kind = Literal["fitted", "predicted"]
 Range = tuple[Number, Number]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PaperNumber:
-    """One number of the paper, beside that of dzdesign."""
+class LawNumber:
+    """One number of the paper that the paper's law predicts from the paper's other numbers."""
 
     valve: str
     """Valve of the paper to which the number belongs."""
@@ -30,40 +26,89 @@ class PaperNumber:
     """Quantity; "without" and "with" refer to the compensator."""
     unit: str
     """Unit of all values of this number."""
-    dp_MPa: Annotated[float | None, quantity("MPa")]
+    dp_MPa: Annotated[float, quantity("MPa")]
     """Pressure drop of the number."""
     published: str
     """Number as printed."""
-    kind: Kind
-    """Whether the number was used in a fit or is predicted."""
-    by: Driver
-    """Source of the value: the bare valve, or the whole product on it."""
     value: Number
-    """Value of dzdesign."""
-    difference: Number | None
-    """Value of dzdesign minus the printed one; null if no number is printed."""
-    ideal_line: Number | None
-    """Value of an ideal line from zero command to the largest flow, for a dead zone with compensator."""
+    """Value that the law states."""
+    range: Range
+    """Range of that value over the rounding of all printed numbers that it follows from."""
     allowed: Range
-    """Range that the printed digits and a measurement error allow."""
+    """Range that the printed digits and a stated measurement error allow."""
     tolerance: str
     """Components of the allowed range."""
+    agrees: bool
+    """Whether the two ranges meet."""
     reason: str
-    """Reason for a value outside the range; empty if it agrees or the reason is unknown."""
-    explained: Range | None
-    """Range that the reason explains; null if there is no reason."""
-    why: str
-    """Background of the number, whether it agrees or not."""
-    agrees: bool = field(init=False)
-    """Whether the value lies in the allowed range."""
+    """Reason for a miss; empty if it agrees."""
+    contradiction: bool
+    """Whether the miss shows that the paper contradicts itself."""
     holds: bool = field(init=False)
-    """Whether the value agrees or misses by no more than its reason explains."""
+    """Whether the number agrees or its miss has a reason."""
 
     def __post_init__(self) -> None:
-        agrees = self.allowed[0] <= self.value <= self.allowed[1]
-        low, high = self.explained or (1.0, 0.0)
-        object.__setattr__(self, "agrees", agrees)
-        object.__setattr__(self, "holds", agrees or (bool(self.reason) and low <= self.value <= high))
+        object.__setattr__(self, "holds", self.agrees or bool(self.reason))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProductResult:
+    """The product on a recovered valve of the paper at one pressure drop, dead zones in percent of full command."""
+
+    valve: str
+    """Valve of the paper."""
+    dp_MPa: Annotated[float, quantity("MPa")]
+    """Pressure drop."""
+    published_without: str
+    """Dead zone without compensator, as printed; the valve was recovered from it."""
+    without: Number
+    """Dead zone without compensator in the closed loop."""
+    published: str
+    """Dead zone that the paper prints with its compensator."""
+    dead_zone: Number
+    """Dead zone with the product."""
+    ideal_line: Number
+    """Dead zone of a straight line from zero command to the largest flow."""
+    published_zero: str
+    """Flow at zero command that the paper prints without beta, L/min; empty if it prints none."""
+    zero_L_min: Annotated[float, quantity("L/min", ge=-LARGEST, le=LARGEST)]
+    """Flow at zero command with the product, L/min."""
+    zero_without_beta_L_min: Annotated[float, quantity("L/min", ge=-LARGEST, le=LARGEST)]
+    """Flow at zero command with the product if beta is ignored, L/min."""
+    published_largest: str
+    """Largest flow without compensator, as printed, L/min."""
+    largest_L_min: Annotated[float, quantity("L/min", ge=-LARGEST, le=LARGEST)]
+    """Largest flow with the product, L/min."""
+    faults: tuple[str, ...]
+    """What is not as it must be; empty if all is."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RejectedReading:
+    """A reading of the paper that was tried, and the printed number that rules it out."""
+
+    reading: str
+    """Reading of the paper."""
+    valve: str
+    """Valve of the number."""
+    quantity: str
+    """Quantity of the number."""
+    unit: str
+    """Unit of all values of this number."""
+    published: str
+    """Number as printed."""
+    value: Number
+    """Value that the reading gives."""
+    range: Range
+    """Range of that value over the rounding of what it follows from."""
+    allowed: Range
+    """Range that the printed digits and a stated measurement error allow."""
+    holds: bool = field(init=False)
+    """Whether the two ranges are apart, so that the reading is ruled out."""
+
+    def __post_init__(self) -> None:
+        apart = self.range[0] > self.allowed[1] or self.range[1] < self.allowed[0]
+        object.__setattr__(self, "holds", apart)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,8 +145,6 @@ class ReproducedValve:
     """Name of the valve."""
     parameters: Mapping[str, Parameter]
     """Parameters of the plant, by name."""
-    level_L_min: Annotated[float, quantity("L/min", ge=0, le=1e6)]
-    """Smallest flow that counts as flow in the paper."""
     bench: Bench
     """Simulated bench."""
     sha256: Hashes
@@ -110,7 +153,7 @@ class ReproducedValve:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reproduction(Artefact):
-    """Every number of the paper beside that of dzdesign, as `dzdesign reproduce` writes it."""
+    """The paper's numbers in three tables, as `dzdesign reproduce` writes them."""
 
     FILE_NAME: ClassVar[str] = "reproduction.json"
     schema: Literal["dzdesign.reproduction/1"] = "dzdesign.reproduction/1"
@@ -118,13 +161,21 @@ class Reproduction(Artefact):
     paper: Annotated[str, Meta(pattern="^10[.]")]
     """DOI of the paper."""
     holds: bool = field(init=False)
-    """Whether every number agrees or misses by no more than its reason explains."""
-    assumptions: tuple[str, ...]
-    """Assumptions that the paper does not state."""
-    numbers: Annotated[tuple[PaperNumber, ...], Meta(min_length=1)]
-    """Numbers in the order of the paper."""
+    """Whether every number of the law agrees or has its reason, the product has no fault, and every rejected reading is
+    ruled out."""
+    given: str
+    """Printed numbers that the others are predicted from."""
+    hypotheses: tuple[str, ...]
+    """What is assumed where the paper leaves it open, one each."""
+    law: Annotated[tuple[LawNumber, ...], Meta(min_length=1)]
+    """(A): the paper's numbers against the paper's law."""
+    product: Annotated[tuple[ProductResult, ...], Meta(min_length=1)]
+    """(B): the product on the same valves."""
+    rejected: tuple[RejectedReading, ...]
+    """(C): readings that were tried and rejected."""
     valves: tuple[ReproducedValve, ...]
     """Valves in the order of the paper."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "holds", all(number.holds for number in self.numbers))
+        argued = all(each.holds for each in self.law) and all(each.holds for each in self.rejected)
+        object.__setattr__(self, "holds", argued and not any(each.faults for each in self.product))

@@ -10,7 +10,8 @@ from dzdesign.derivation.account.published import DP0_MPA, DP1_MPA, U_MAX_V, Pub
 from dzdesign.derivation.law import law
 from dzdesign.identify.plots.frame import finish, new_figure, saved
 from dzdesign.identify.plots.style import plot_style
-from dzdesign.reproduce.recovered_valves import AtRest, printed_at
+from dzdesign.reproduce.law_numbers import law_of
+from dzdesign.reproduce.recovered_valves import METER_START_L_MIN, AtRest, printed_at
 from dzdesign.reproduce.runs import DIRECT, PRESSURES_MPA, PRODUCT, WITHOUT_BETA, ValveRuns
 from dzdesign.verify.closed_loop.loop import LoopRun
 
@@ -82,8 +83,7 @@ def _over_command(number: int, title: str, runs: ValveRuns, *draw: Callable[["Ax
     figure, (axes,) = _new(number, title, MARKS)
     for each in draw:
         each(axes, runs)
-    if runs.valve.level_L_min:
-        axes.axhline(runs.valve.level_L_min, color=GREY, ls=(0, (1, 3)), lw=1.2, label="meter's floor")
+    axes.axhline(METER_START_L_MIN, color=GREY, ls=(0, (1, 3)), lw=1.2, label="meter's floor")
     return _done(figure, 4)
 
 
@@ -104,12 +104,12 @@ def _papers_law(axes: "Axes", runs: ValveRuns, dp_MPa: float, label: str, color:
 def paper_drive(valve: PublishedValve, command: np.ndarray, dp_MPa: float, with_beta: bool = True) -> np.ndarray:
     """Return the output of the paper's compensator over u_max, at dP0 or dP1, of what the paper prints.
 
-    The valve's dead zones are u_min0 and, over it, beta, Eq. (5); k x_max is the command left above u_min0. `with_beta`
-    says whether the selector of Eq. (7) heeds the pressure drop.
+    u_min0 is the offset that leaves the printed dead zone at dP0, beta the ratio of the valve's dead zones, Eq. (5); k
+    x_max is the command left above u_min0. `with_beta` says whether the selector of Eq. (7) heeds the pressure drop.
     """
-    u_min0, fitted = (float(printed_at(valve, each).dead_zone_percent) / 100 for each in (DP0_MPA, dp_MPa))
-    beta, chosen = fitted / u_min0 if with_beta else 1.0, law("paper")
-    drive = chosen.evaluate_gain(beta, 1 - u_min0) * command + chosen.evaluate_offset(beta, u_min0)
+    stated, chosen = law_of(valve, (0,) * 6), law("paper")
+    beta = stated.read1 / stated.read0 if with_beta and dp_MPa != DP0_MPA else 1.0
+    drive = chosen.evaluate_gain(beta, 1 - stated.offset0) * command + chosen.evaluate_offset(beta, stated.offset0)
     return np.asarray(np.clip(drive, 0.0, 1.0))
 
 
@@ -126,7 +126,7 @@ def _mark_without(axes: "Axes", runs: ValveRuns, dp_MPa: float) -> None:
     """Mark dead zone and largest flow without compensator."""
     printed = printed_at(runs.valve.published, dp_MPa)
     dead_zone_V = float(printed.dead_zone_percent) / 100 * U_MAX_V
-    _mark(axes, dead_zone_V, runs.valve.level_L_min, dp_MPa, "^", "dead zone")
+    _mark(axes, dead_zone_V, METER_START_L_MIN, dp_MPa, "^", "dead zone")
     _mark(axes, U_MAX_V, float(printed.flow), dp_MPa, "s", "largest flow")
 
 
@@ -134,7 +134,7 @@ def _mark_with(axes: "Axes", runs: ValveRuns, dp_MPa: float) -> None:
     """Mark dead zone and largest flow with compensator."""
     valve = runs.valve.published
     dead_zone_V = float(valve.residual_percent) / 100 * U_MAX_V
-    _mark(axes, dead_zone_V, runs.valve.level_L_min, dp_MPa, "v", "dead zone, with", hollow=True)
+    _mark(axes, dead_zone_V, METER_START_L_MIN, dp_MPa, "v", "dead zone, with", hollow=True)
     _mark(axes, U_MAX_V, float(printed_at(valve, dp_MPa).flow_with), dp_MPa, "o", "largest flow, with", hollow=True)
 
 

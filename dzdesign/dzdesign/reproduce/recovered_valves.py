@@ -29,11 +29,14 @@ from dzdesign.derivation.account.published import (
 )
 from dzdesign.derivation.lowering import lower
 from dzdesign.reproduce.artefact import Parameter
+from dzdesign.reproduce.law_numbers import half_digit
 from dzdesign.verify.closed_loop.plant import L_MIN, MPA, Plant
 
 #: At least this much overlap, mm: less than what the ripple of the PWM, which the paper's simulation lacks, would
 #: open at zero command.
 LEAST_OVERLAP_MM = 0.005
+#: Where the meter of section 4.1 starts: at this flow dead zones are read, those of the simulation too.
+METER_START_L_MIN = float(METER_FLOOR_L_MIN)
 #: Of a valve without a visible stop: no displacement comes near it.
 NO_STOP_MM = 10.0
 #: Digits of the recovered parameters: more than the print determines, fewer than a machine's last bits reach.
@@ -60,17 +63,6 @@ def printed_at(valve: PublishedValve, dp_MPa: float) -> PrintedAt:
     return PrintedAt(*(getattr(valve, name) for name in (*names, f"displacement_dead_zone{at}_percent")))
 
 
-def half_digit(published: str) -> float:
-    """Return half a unit of the last printed digit.
-
-    Examples
-    --------
-    >>> half_digit("53.5"), half_digit("15")
-    (0.05, 0.5)
-    """
-    return 0.5 * 10.0 ** -len(published.partition(".")[2])
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecoveredValve:
     """A valve of the paper as a plant."""
@@ -80,8 +72,6 @@ class RecoveredValve:
     #: Recovered parameter -> by how much it may be off for the rounding of the printed figures; the plant's other
     #: parameters are the default plant's or of another valve.
     rounding: Mapping[str, float]
-    #: Flow from which the paper sees flow: its meter's floor, zero in its simulation.
-    level_L_min: float
 
     def parameters(self) -> dict[str, Parameter]:
         """Return the parameters of the plant, each marked as recovered or not."""
@@ -105,33 +95,31 @@ def recover_valves() -> tuple[RecoveredValve, ...]:
         u_max_V=float(U_MAX_V), hysteresis_V=0.0, droop_MPa_L_min2=0.0, stroke_mm=NO_STOP_MM,
         overlap_mm=LEAST_OVERLAP_MM,
     )  # fmt: skip
-    simulated = recover(SIMULATION, base, 0.0)
-    tested = (recover(valve, simulated.plant, float(METER_FLOOR_L_MIN)) for valve in (FIRST, SECOND))
-    return (simulated, *tested)
+    simulated = recover(SIMULATION, base)
+    return (simulated, *(recover(valve, simulated.plant) for valve in (FIRST, SECOND)))
 
 
-def recover(valve: PublishedValve, base: Plant, level_L_min: float) -> RecoveredValve:
+def recover(valve: PublishedValve, base: Plant) -> RecoveredValve:
     """Find the parameters of a valve that have its printed figures; no valve may have them: a `RequirementError`."""
     texts = [text for dp_MPa in (DP0_MPA, DP1_MPA) for text in printed_at(valve, dp_MPa)[:2]]
     texts += [valve.stroke0_mm] if valve.stroke0_mm else []
     figures, halves = np.array(list(map(float, texts))), np.diag(list(map(half_digit, texts)))
-    found = _solved(figures, base, level_L_min)
+    found = _solved(figures, base)
     if impossible := [name for name, value in found.items() if value < 0]:
         raise RequirementError(
             f"the {valve.name} can't be recovered: {impossible[0]} would be {found[impossible[0]]:.3g}, less than none"
         )
     # Every figure off by its half digit, all in the worst direction.
-    moved = [[_solved(figures + sign * each, base, level_L_min) for sign in (1, -1)] for each in halves]
+    moved = [[_solved(figures + sign * each, base) for sign in (1, -1)] for each in halves]
     rounding = {name: sum(abs(more[name] - less[name]) / 2 for more, less in moved) for name in found}
     return RecoveredValve(
         published=valve,
         plant=replace(base, **{name: float(f"{value:.{DIGITS}g}") for name, value in found.items()}),
         rounding={name: float(f"{value:.2g}") for name, value in rounding.items()},
-        level_L_min=level_L_min,
     )
 
 
-def _solved(figures: np.ndarray, base: Plant, level_L_min: float) -> dict[str, float]:
+def _solved(figures: np.ndarray, base: Plant) -> dict[str, float]:
     """Return the parameters at rest that have dead zone (%) and largest flow at dP0 and dP1, and a stroke at dP0, mm.
 
     `AtRest` solved for them: opening command and flow per volt follow from each pair of figures, and in these the
@@ -139,7 +127,7 @@ def _solved(figures: np.ndarray, base: Plant, level_L_min: float) -> dict[str, f
     """
     dp = np.array([DP0_MPA, DP1_MPA], dtype=float)
     seen, largest = figures[:4:2] / 100 * U_MAX_V, figures[1:4:2]
-    per_volt = (largest - level_L_min) / (U_MAX_V - seen)
+    per_volt = (largest - METER_START_L_MIN) / (U_MAX_V - seen)
     opens = U_MAX_V - largest / per_volt
     rest = [AtRest(replace(base, C_d_W_mm=1.0), each) for each in dp]
     newtons, edge = rest[0].newtons_per_volt, np.array([each.flow_per_mm for each in rest])

@@ -4,32 +4,26 @@ The runs are the ramps of Sections 2 and 4, bare and with the product's C.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from math import ceil
-
-import numpy as np
+from dataclasses import dataclass
 
 from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.documents import sha256_of
 from dzdesign.core.placing import scratch_folder
-from dzdesign.derivation.account.published import DP0_MPA, DP1_MPA, DUTY_COMMAND_V, RAMP_S, RECORDS_HZ, U_MAX_V
-from dzdesign.design.compensator import Compensator
+from dzdesign.derivation.account.published import DP0_MPA, DP1_MPA, RAMP_S, RECORDS_HZ, U_MAX_V
 from dzdesign.design.designing import design
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_files import SIMULATED_MARK, ramp_file_bytes, read_ramp_file
 from dzdesign.reproduce.artefact import Hashes, ReproducedValve
-from dzdesign.reproduce.recovered_valves import RecoveredValve
-from dzdesign.verify.closed_loop.loop import RECORD_S, ClosedLoop, LoopRun, RampSequence
+from dzdesign.reproduce.recovered_valves import METER_START_L_MIN, RecoveredValve
+from dzdesign.verify.closed_loop.loop import ClosedLoop, LoopRun, RampSequence
 from dzdesign.verify.closed_loop.plant import L_MIN, MPA
-from dzdesign.verify.closed_loop.ramps import FLOW_SHARE, dead_zone
+from dzdesign.verify.closed_loop.ramps import dead_zone
 from dzdesign.verify.closed_loop.simulated_recordings import Bench, simulate_ramp
 
 PRESSURES_MPA = (float(DP0_MPA), float(DP1_MPA))
-#: The largest flow is reached where the flow comes this close to it.
-REACHED = 0.999
 #: What drives the valve, as the loop calls it.
 DIRECT, PRODUCT, WITHOUT_BETA = "direct", "compensated", "without beta"
 
@@ -41,25 +35,11 @@ class ValveRuns:
     valve: RecoveredValve
     #: By what drives and pressure drop in MPa: up to full command and back.
     ramps: dict[tuple[str, float], LoopRun]
-    #: Of the product at the command of Fig. 13 and dP0.
-    duty_percent: float
-    #: Commands about zero that the product takes for zero, percent of full.
-    zero_band_percent: float
-    #: Commands behind these in which the product goes from the closing offset to the opening threshold.
-    transition_percent: float
-
-    @property
-    def direct_duty_percent(self) -> float:
-        """Duty cycle of the loop's PWM at the command of Fig. 12, with nobody between, percent."""
-        run = self.ramps[DIRECT, PRESSURES_MPA[0]]
-        at = int(np.argmax(run.command >= DUTY_COMMAND_V / U_MAX_V))
-        return 100 * float(run.compare[at] / run.compare.max())
 
     def dead_zone_percent(self, drive: str, dp_MPa: float) -> float:
-        """Return the command, percent of full, at which rising flow passes what the paper takes for flow."""
+        """Return the command, percent of full, at which rising flow passes the meter's start."""
         run = self.ramps[drive, dp_MPa]
-        level = self.valve.level_L_min or FLOW_SHARE * float(run.q_mean_L_min.max())
-        return 100 * dead_zone(run, level, rising=True)
+        return 100 * dead_zone(run, METER_START_L_MIN, rising=True)
 
     def largest_L_min(self, drive: str, dp_MPa: float) -> float:
         """Return the largest flow of a ramp."""
@@ -69,29 +49,17 @@ class ValveRuns:
         """Return the flow at zero command, after closing."""
         return float(self.ramps[drive, dp_MPa].q_largest_L_min[-1])
 
-    def flat_from_V(self, drive: str, dp_MPa: float) -> float:
-        """Return the command at which the largest flow is reached."""
-        run = self.ramps[drive, dp_MPa]
-        return U_MAX_V * float(run.command[np.argmax(run.q_mean_L_min >= REACHED * run.q_mean_L_min.max())])
 
-
-def run_valve(valve: RecoveredValve, loop: ClosedLoop, compensator: Compensator) -> ValveRuns:
+def run_valve(valve: RecoveredValve, loop: ClosedLoop) -> ValveRuns:
     """Run a recovered valve through the paper's ramps, bare and with the loop's firmware."""
-    dp0_MPa, span = PRESSURES_MPA[0], compensator.signals.command.span(1)
-    ramp = RampSequence(ramp=float(RAMP_S)).command()
-    # Zero command for as long as the drive waits for it after a reset.
-    held = np.append(np.zeros(ceil(loop.waits_s / RECORD_S) + 1), np.full(2, DUTY_COMMAND_V / U_MAX_V))
-    drives = (DIRECT, PRODUCT, *([WITHOUT_BETA] if valve.published.zero_flow_without_beta else []))
+    ramp, dp0_MPa = RampSequence(ramp=float(RAMP_S)).command(), PRESSURES_MPA[0]
     return ValveRuns(
         valve=valve,
         ramps={
             (drive, dp_MPa): loop.run(ramp, dp_MPa, drive, dp_frozen_MPa=dp0_MPa)
             for dp_MPa in PRESSURES_MPA
-            for drive in drives
+            for drive in (DIRECT, PRODUCT, WITHOUT_BETA)
         },
-        duty_percent=100 * float(loop.run(held, dp0_MPa, PRODUCT).compare[-1]) / compensator.signals.compare_max,
-        zero_band_percent=100 * compensator.zero_band_codes / span,
-        transition_percent=100 * compensator.transition_codes / span,
     )
 
 
@@ -110,7 +78,9 @@ class Chain:
 
 def run_chain(valve: RecoveredValve, say: Callable[[str], None] = lambda _: None) -> Chain:
     """Run a recovered valve through the product; `say` is called before each stage."""
-    name, bench = valve.published.name, bench_of(valve)
+    name = valve.published.name
+    # The bench of Section 4.1; the paper gives no lag of the meter, and none is simulated.
+    bench = Bench(rate_Hz=float(RECORDS_HZ), meter_lag_s=0.0, meter_floor_L_min=METER_START_L_MIN)
     with scratch_folder() as scratch:
         say(f"{name}: ramp tests of the recovered valve")
         ramps = _ramp_tests(valve, bench)
@@ -118,7 +88,7 @@ def run_chain(valve: RecoveredValve, say: Callable[[str], None] = lambda _: None
         for file, content in ramps.items():
             (scratch / file).write_bytes(content)
         tests = [read_ramp_file(scratch / file) for file in ramps]  # as a user's are read
-        floor = valve.level_L_min * L_MIN  # as an engineer who read Section 4.1 would declare it
+        floor = METER_START_L_MIN * L_MIN  # as an engineer who read Section 4.1 would declare it
         options = IdentifyOptions(
             u_max=float(U_MAX_V),
             dp0=DP0_MPA * MPA,
@@ -138,7 +108,7 @@ def run_chain(valve: RecoveredValve, say: Callable[[str], None] = lambda _: None
         write_folder(scratch / "firmware", firmware.contents, firmware.manifest)
         say(f"{name}: closed loop")
         loop = ClosedLoop(valve.plant, scratch / "firmware", compensator)
-        runs = run_valve(valve, loop, compensator)
+        runs = run_valve(valve, loop)
     place = name.replace(" ", "_")
     return Chain(
         files={
@@ -149,7 +119,6 @@ def run_chain(valve: RecoveredValve, say: Callable[[str], None] = lambda _: None
         valve=ReproducedValve(
             valve=name,
             parameters=valve.parameters(),
-            level_L_min=valve.level_L_min,
             bench=bench,
             sha256=Hashes(
                 ramp_tests={file: sha256_of(content) for file, content in ramps.items()},
@@ -162,17 +131,6 @@ def run_chain(valve: RecoveredValve, say: Callable[[str], None] = lambda _: None
         ),
         runs=runs,
     )
-
-
-def bench_of(valve: RecoveredValve) -> Bench:
-    """Return the bench of Section 4.1: 100 Hz, and a meter that starts at 0.6 L/min; a simulation has exact readings.
-
-    The paper gives no lag of the meter, and none is simulated.
-    """
-    bench = Bench(rate_Hz=float(RECORDS_HZ), meter_lag_s=0.0, meter_floor_L_min=valve.level_L_min)
-    if valve.level_L_min:
-        return bench
-    return replace(bench, meter_noise_L_min=0.0, command_noise_V=0.0, pressure_noise_MPa=0.0)
 
 
 def _ramp_tests(valve: RecoveredValve, bench: Bench) -> dict[str, bytes]:

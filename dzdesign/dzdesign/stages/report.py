@@ -27,6 +27,8 @@ class ReportArguments:
     """File to write (default of the command: report.html with the evidence, or in the folder)."""
     logo: Annotated[AnyPath | None, Option("IMAGE")] = None
     """Logo beside the title. The page embeds a PNG, JPEG or GIF."""
+    full: Annotated[bool, Option()] = False
+    """Unfold evidence, constants and hashes, on the screen and in print."""
 
 
 def report(arguments: ReportArguments) -> "Report":
@@ -55,7 +57,7 @@ def report(arguments: ReportArguments) -> "Report":
     else:
         refuse_uncalibrated(folder)
         firmware = None if arguments.firmware is None else Path(arguments.firmware)
-        made = report_of_folder(folder, logo, firmware)
+        made = report_of_folder(folder, logo, firmware, full=arguments.full)
     if arguments.output is not None:
         _write_report(Path(arguments.output), made.html)
     return made

@@ -1,4 +1,4 @@
-"""`reproduce`: the paper's valves through the whole product, and every number of the paper beside ours."""
+"""`reproduce`: the paper's numbers against its law, and the paper's valves through the whole product."""
 
 import os
 from dataclasses import dataclass
@@ -27,8 +27,9 @@ class ReproduceArguments:
 def reproduce(arguments: ReproduceArguments) -> "Reproduction":
     """Reproduce the paper's numbers and figures, and write them to a folder."""
     from dzdesign.core.artefact_types import THIS_TOOL, schema_of, to_json_bytes
-    from dzdesign.reproduce import figures, numbers, runs
+    from dzdesign.reproduce import figures, law_numbers, runs
     from dzdesign.reproduce.artefact import Reproduction
+    from dzdesign.reproduce.product_results import product_results
     from dzdesign.reproduce.recovered_valves import recover_valves
     from dzdesign.verify.toolchain.host_compiler import host_compiler
 
@@ -44,8 +45,11 @@ def reproduce(arguments: ReproduceArguments) -> "Reproduction":
             tool=THIS_TOOL,
             made_from=(),
             paper=PAPER_DOI,
-            assumptions=numbers.ASSUMPTIONS,
-            numbers=tuple(numbers.paper_numbers(ran)),
+            given=law_numbers.GIVEN,
+            hypotheses=law_numbers.HYPOTHESES,
+            law=tuple(law_numbers.law_numbers()),
+            product=tuple(product_results(ran)),
+            rejected=tuple(law_numbers.rejected_readings()),
             valves=tuple(each.valve for each in chains),
         )
         stage("drawing")

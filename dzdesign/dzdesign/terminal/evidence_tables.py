@@ -1,5 +1,6 @@
 """A verification, an assessment and a reproduction as tables on stdout."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
 
     from dzdesign.assess.assessment import Assessment, PressureAssessment
     from dzdesign.core.recorded_units import RecordedUnits
-    from dzdesign.reproduce.artefact import PaperNumber, Reproduction
+    from dzdesign.reproduce.artefact import LawNumber, ProductResult, RejectedReading, Reproduction
     from dzdesign.verify.evidence import Evidence
     from dzdesign.verify.loop_results import ScenarioResult
     from dzdesign.verify.outputs.verification import OutputVerification
@@ -108,7 +109,6 @@ def print_assessment(assessment: "Assessment") -> None:
     put_facts(page, *section.tables)
     lines = [
         *section.lines,
-        *_ideal_line(assessment),
         *_not_observable(assessment),
         *_remarks(assessment),
         meter_line(meter.floor_L_min, lag_in_words(meter.lag_s, meter.lag_is), units),
@@ -118,16 +118,6 @@ def print_assessment(assessment: "Assessment") -> None:
     for line in lines:
         put_line(page, line)
     put_units(page, units, "assessment.json")
-
-
-def _ideal_line(assessment: "Assessment") -> list[str]:
-    """Return what a straight line from zero to the largest flow would read at the reading flow."""
-    read = [
-        f"{found.value:.2f} % ({item.place(assessment.recorded_units)})"
-        for item in _shown_pressures(assessment)
-        if (found := item.quantities["ideal_line"].after) and found.value is not None
-    ]
-    return [f"At the reading flow an ideal line from zero reads {', '.join(read)}."] if read else []
 
 
 def _not_observable(assessment: "Assessment") -> list[str]:
@@ -197,56 +187,73 @@ AGREES, MISSED, UNEXPLAINED = "agrees", "MISSED", "MISSED, NOBODY KNOWS WHY"
 
 
 def print_reproduction(reproduction: "Reproduction") -> None:
-    """Print the paper's numbers beside ours, valve by valve, and the reasons."""
+    """Print the three tables: the paper against its law, the product on its valves, and readings that were rejected."""
     console = new_console()
-    notes: dict[str, int] = {}
-
-    def verdict(item: "PaperNumber") -> str:
-        texts = filter(None, (item.reason, item.why))
-        return f"{verdict_of(item)} {''.join(f'[{notes.setdefault(each, len(notes) + 1)}]' for each in texts)}".strip()
-
-    columns: dict[str, Column[PaperNumber]] = {
+    missed = [item for item in reproduction.law if not item.agrees]
+    columns: dict[str, Column[LawNumber]] = {
+        "valve": lambda item: item.valve,
         "": lambda item: item.quantity,
-        "MPa": lambda item: "" if item.dp_MPa is None else f"{item.dp_MPa:g}",
-        "paper": with_unit,
-        "ours": lambda item: f"{item.value:.2f}",
-        "of": lambda item: item.by,
-        "ideal line": lambda item: "" if item.ideal_line is None else f"{item.ideal_line:.2f}",
-        "verdict": verdict,
+        "MPa": lambda item: f"{item.dp_MPa:g}",
+        "paper": lambda item: _with_unit(item.published, item.unit),
+        "its law": lambda item: _range(item.range),
+        "verdict": lambda item: AGREES if item.agrees else f"{MISSED} [{1 + missed.index(item)}]",
     }
-    for valve in reproduction.valves:
-        of_valve = [item for item in reproduction.numbers if item.valve == valve.valve]
-        read = f"; dead zones read at {valve.level_L_min:g} L/min" if valve.level_L_min else ""
-        put_rows(console, f"The paper's numbers and ours: {valve.valve}{read}", of_valve, columns, words=(0, 4, 6))
-    for note, number in notes.items():
-        put_line(console, f"[{number}] {note}")
-    put_line(console, f"Assumed, as the paper does not say it: {'; '.join(reproduction.assumptions)}")
+    put_rows(console, "(A) The paper's numbers against the paper's law", reproduction.law, columns, words=(0, 1, 5))
+    for number, item in enumerate(missed, 1):
+        itself = " The paper contradicts itself." if item.contradiction else ""
+        put_line(console, f"[{number}] {item.reason or UNEXPLAINED}.{itself}")
+    _put_product(console, reproduction.product)
+    readings: dict[str, Column[RejectedReading]] = {
+        "reading": lambda item: f"{item.valve}: {item.reading}",
+        "number": lambda item: item.quantity,
+        "paper": lambda item: _with_unit(item.published, item.unit),
+        "reading gives": lambda item: _range(item.range) if item.holds else f"{_range(item.range)}, NOT RULED OUT",
+    }
+    put_rows(console, "(C) Readings of the paper that were tried and rejected", reproduction.rejected, readings,
+             words=(0, 1))  # fmt: skip
+    put_line(console, f"Given in (A): {reproduction.given}.")
+    put_line(console, f"Assumed, as the paper does not say it: {'; '.join(reproduction.hypotheses)}.")
     for line in summary(reproduction):
         put_line(console, line)
 
 
+def _put_product(console: "Console", results: "Sequence[ProductResult]") -> None:
+    columns: dict[str, Column[ProductResult]] = {
+        "valve": lambda item: item.valve,
+        "MPa": lambda item: f"{item.dp_MPa:g}",
+        "without": lambda item: f"{item.published_without} %",
+        "paper": lambda item: f"{item.published} %",
+        "dzdesign": lambda item: f"{item.dead_zone:.1f} %",
+        "ideal line": lambda item: f"{item.ideal_line:.1f} %",
+        "zero, paper without beta": lambda item: item.published_zero and f"{item.published_zero} L/min",
+        "zero, dzdesign": lambda item: f"{item.zero_L_min:g} L/min",
+    }
+    put_rows(console, "(B) dzdesign on the same valves: dead zone at 0.6 L/min, flow at zero command", results, columns)
+    for item in results:
+        for fault in item.faults:
+            put_line(console, f"WRONG, {item.valve}, {item.dp_MPa:g} MPa: {fault}")
+
+
 def summary(reproduction: "Reproduction") -> list[str]:
-    """Return how many numbers are of which kind, and how many of the predicted ones agree."""
-    numbers = reproduction.numbers
-    predicted = [item.agrees for item in numbers if item.kind == "predicted"]
-    kinds = {kind: sum(item.kind == kind for item in numbers) for kind in ("fitted", "predicted")}
-    unknown = sum(not item.holds for item in numbers)
+    """Return what became of the predicted numbers, and of the product."""
+    law = reproduction.law
+    agree, itself = (sum(getattr(item, name) for item in law) for name in ("agrees", "contradiction"))
+    unknown, faults = sum(not item.holds for item in law), sum(bool(item.faults) for item in reproduction.product)
+    missed = len(law) - agree
+    right = "dzdesign passes no flow at zero command, and its dead zone is that of the ideal line."
     return [
-        f"{len(numbers)} numbers: " + ", ".join(f"{count} {kind}" for kind, count in kinds.items()) + ".",
-        f"Of {len(predicted)} predicted {predicted.count(True)} agree and {predicted.count(False)} are missed.",
-        f"{unknown} MISSED FOR NO REASON THAT REACHES SO FAR." if unknown else "Every miss has its reason.",
+        f"{len(law)} numbers predicted: {agree} agree, {missed} are missed; in {itself} of these the paper contradicts "
+        "itself.",
+        f"{unknown} MISSED FOR NO REASON." if unknown else "Every miss has its reason.",
+        f"dzdesign is WRONG in {faults} rows." if faults else right,
     ]
 
 
-def with_unit(item: "PaperNumber") -> str:
+def _with_unit(published: str, unit: str) -> str:
     """Return a printed number with its unit; words have none."""
-    return f"{item.published} {item.unit}" if item.published[0].isdigit() else item.published
+    return f"{published} {unit}" if published[0].isdigit() else published
 
 
-def verdict_of(item: "PaperNumber") -> str:
-    """Return what became of a number: nothing that was fitted agrees."""
-    if not item.holds:
-        return UNEXPLAINED
-    if item.kind != "predicted":
-        return item.kind
-    return AGREES if item.agrees else MISSED
+def _range(ends: tuple[float, float]) -> str:
+    """Return a range whose ends are rounded as they are printed; one number where they read alike."""
+    return " to ".join(dict.fromkeys(f"{end:.2f}" for end in ends))

@@ -35,15 +35,45 @@ DARK = {
     "orange": "#e6b422",
     "sky": "#9ad0f5",
 }
+#: Ends of the one hue that stands for the pressure drop, lowest and highest, of the light theme and of the dark one.
+#: The highest contrasts most with the paper.
+PRESSURE_ENDS = {"light": ((104, 178, 226), (6, 26, 62)), "dark": ((58, 108, 152), (236, 246, 255))}
+SHADES = 8
+
+
+def _shades(theme: str) -> list[str]:
+    """Return shades from that of the lowest pressure drop to that of the highest."""
+    ends = list(zip(*PRESSURE_ENDS[theme], strict=True))
+    steps = [at / (SHADES - 1) for at in range(SHADES)]
+    return ["#" + "".join(f"{round(low + step * (high - low)):02x}" for low, high in ends) for step in steps]
+
+
+LIGHT_SHADES = _shades("light")
 #: Name of a variable of the page -> (light, dark).
-PALETTE = {name: (light, DARK[name]) for name, light in LIGHT.items()}
+PALETTE = {name: (light, DARK[name]) for name, light in LIGHT.items()} | {
+    f"dp{at}": pair for at, pair in enumerate(zip(LIGHT_SHADES, _shades("dark"), strict=True))
+}
 #: As a page has them; without, each name in the markup would get a prefix of its own.
 for prefix, address in (("", "http://www.w3.org/2000/svg"), ("xlink", "http://www.w3.org/1999/xlink")):
     ElementTree.register_namespace(prefix, address)
 #: Inches, and points of the numbers on axes and of the words of a legend.
 WIDTH, TICK_SIZE, LEGEND_SIZE = 7.4, 8.5, 8.5
 #: Room that a label at a line's end takes, of the height of the axes.
-LABEL_HEIGHT = 0.055
+LABEL_HEIGHT = 0.063
+
+
+@dataclass(frozen=True, slots=True)
+class PressureHues:
+    """The shade of each pressure drop of a report, MPa, in rising order: the same one in every figure."""
+
+    known: tuple[float, ...]
+
+    def of(self, dp_MPa: float | None) -> str:
+        """Return the shade of the known pressure drop that is nearest; the darkest of one that was not recorded."""
+        if dp_MPa is None or len(self.known) < 2:
+            return LIGHT_SHADES[-1]
+        at = min(range(len(self.known)), key=lambda place: abs(self.known[place] - dp_MPa))
+        return LIGHT_SHADES[round(at * (SHADES - 1) / (len(self.known) - 1))]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,8 +164,8 @@ def legend_below(figure: "Figure", columns: int) -> None:
         legend.remove()
 
 
-def label_ends(axes: "Axes", labels: Sequence[tuple[float, float, str, str]]) -> None:
-    """Write names beside lines' ends (x, y, text, hue; in the axes' units), moved apart where one would cover another.
+def label_ends(axes: "Axes", labels: Sequence[tuple[float, float, str]]) -> None:
+    """Write names beside lines' ends (x, y, text; in the axes' units), moved apart where one would cover another.
 
     Of an end at negative x the name stands at its left.
     """
@@ -144,9 +174,9 @@ def label_ends(axes: "Axes", labels: Sequence[tuple[float, float, str, str]]) ->
     for sign, align in ((1, "left"), (-1, "right")):
         ends = sorted((label for label in labels if (label[0] < 0) is (sign < 0)), key=lambda label: label[1])
         places = apart([end[1] for end in ends], LABEL_HEIGHT * (high - low))
-        for (x, _, text, hue), place in zip(ends, places, strict=True):
+        for (x, _, text), place in zip(ends, places, strict=True):
             axes.annotate(text, (x, place), xytext=(5 * sign, 0), textcoords="offset points", va="center", ha=align,
-                          fontsize=8, color=hue, annotation_clip=False)  # fmt: skip
+                          fontsize=8, annotation_clip=False)  # fmt: skip
 
 
 def apart(places: Sequence[float], room: float) -> list[float]:

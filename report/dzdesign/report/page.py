@@ -182,6 +182,28 @@ def counted(count: int, noun: str) -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
+def for_both_sides(lines: Iterable[str]) -> tuple[str, ...]:
+    """Return lines of which two that differ in the side alone are one.
+
+    Examples
+    --------
+    >>> for_both_sides(["positive side, no flow", "Negative commands: 2 V", "negative side, no flow"])
+    ('both sides, no flow', 'Negative commands: 2 V')
+    """
+    of_side = r"(positive|negative) (side|commands)"
+    found: dict[str, list[str]] = {}
+    for line in lines:
+        found.setdefault(re.sub(of_side, "", line, flags=re.IGNORECASE), []).append(line)
+
+    def merged(alike: Sequence[str]) -> str:
+        if len({word.lower() for line in alike for word, _ in re.findall(of_side, line, re.IGNORECASE)}) < 2:
+            return alike[0]
+        text = re.sub(of_side, "both sides", alike[0], flags=re.IGNORECASE)
+        return text[:1].upper() + text[1:] if alike[0][:1].isupper() else text
+
+    return tuple(merged(alike) for alike in found.values())
+
+
 def verdict(holds: bool | None) -> Cell:
     """Return a verdict with its sign; None: not checked."""
     sign, kind = VERDICTS[holds]
@@ -195,13 +217,15 @@ def verdict(holds: bool | None) -> Cell:
 class Headline:
     """The verdict: good if all holds, bad if something does not, open if something was not checked.
 
-    `reasons` name what does not hold or was not checked, `unrequired` what passes at zero command at most where no
-    requirement forbids it, `untried` what nobody asked for and the command that tries it, `cautions` what the verdict
-    is not about, and what somebody accepted; `some_failed`: valves of a lot are not calibrated.
+    `basis` says on what a good one rests; `reasons` name what does not hold or was not checked, `unrequired` what
+    passes at zero command at most where no requirement forbids it, `untried` what nobody asked for and the command that
+    tries it, `cautions` what the verdict is not about, and what somebody accepted; `some_failed`: valves of a lot are
+    not calibrated.
     """
 
     kind: str
     text: str
+    basis: str = ""
     reasons: tuple[str, ...] = ()
     unrequired: str = ""
     untried: tuple[str, ...] = ()
@@ -221,11 +245,12 @@ class Headline:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Figure:
-    """One number that matters: its label, the number itself and what it is of."""
+    """One number that matters: its label, the number itself, one to compare it with, and what it is of."""
 
     label: str
     value: str
     note: str
+    beside: str = ""
     kind: str = "text"
 
 
@@ -245,6 +270,12 @@ class Section:
     missing: str = ""
     optional: bool = False
 
+    @property
+    def is_empty(self) -> bool:
+        """Whether there is nothing to show, and nothing missing."""
+        shown = (*self.figures, *self.tables, *self.lines, *(line for _, lines in self.groups for line in lines))
+        return not any(shown) and not self.missing
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Page:
@@ -252,9 +283,10 @@ class Page:
 
     `template` has the heading of every section, and what no report proves; `sections` by anchor what this one found;
     `missing` what is not there or not used, and which command makes it; `record` who and what, in the engineer's words.
-    `not_counted` is what of a machine no certificate here counts. Of a lot setting `lot` stands before all other
-    figures, and `carrier` is the one valve that `record` and `figures` are of. `subtitle` says what the report is of,
-    where the title names the valve; `lead` is the figure of the first page, `logo` a data: address.
+    `of_figures` says what the figures are of, `not_counted` what of a machine no certificate here counts. Of a lot
+    setting `lot` stands before all other figures, and `carrier` is the one valve that `record` and `figures` are of.
+    `subtitle` says what the report is of, where the title names the valve; `lead` is the figure of the first page,
+    `logo` a data: address. A `full` page has no appendix folded, on a screen and on paper.
     """
 
     title: str
@@ -267,10 +299,12 @@ class Page:
     record: Sequence[tuple[str, str]] = ()
     lot: Sequence[Figure] = ()
     carrier: str = ""
+    of_figures: str = ""
     not_counted: Sequence[str] = ()
     subtitle: str = ""
     lead: ReportFigure | None = None
     logo: str = ""
+    full: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -305,8 +339,12 @@ def report_of(page: Page) -> Report:
     """Return the finished report of a page."""
     verdict = page.verdict
     return Report(
-        html=render(page), kind=verdict.kind, holds=verdict.holds, verdict=verdict.text, missing=tuple(page.missing)
-    )  # fmt: skip
+        html=render(page),
+        kind=verdict.kind,
+        holds=verdict.holds,
+        verdict=". ".join(filter(None, (verdict.text, verdict.basis))),
+        missing=tuple(page.missing),
+    )
 
 
 def render(page: Page) -> str:

@@ -7,39 +7,40 @@ from pathlib import Path
 from dzdesign.core.display import verdict_words
 from dzdesign.design.certificate import not_counted
 from dzdesign.report.artefacts import Chain, MadeOutput, MadeOutputs, chain_of_evidence, outputs_in, read_chain
-from dzdesign.report.figure import figure_style
+from dzdesign.report.figure import PressureHues, figure_style
 from dzdesign.report.page import Cell, Headline, Page, Report, Section, counted, report_of, table_of, verdict, whole
 from dzdesign.report.sections.characteristic import characteristic_figure, characteristic_section
-from dzdesign.report.sections.closed_loop import loop_section
+from dzdesign.report.sections.closed_loop import loop_section, plant_section
 from dzdesign.report.sections.inputs import inputs_section
-from dzdesign.report.sections.law import account_of, budget_section, integers_section, law_section
+from dzdesign.report.sections.law import account_of, budget_section, law_section
 from dzdesign.report.sections.provenance import (
     carrier_of,
-    checks_section,
+    checks_sections,
     lot_figures,
     lot_section,
     provenance_section,
     remaining_section,
     warnings_section,
 )
-from dzdesign.report.sections.quantities import characteristic_curves, characteristic_quantities
-from dzdesign.report.sections.valve import conditions_section, valve_sections
-from dzdesign.report.summary import headline, key_figures, valve_name
+from dzdesign.report.sections.quantities import characteristic_curves, characteristic_quantities, pressure_hues
+from dzdesign.report.sections.valve import conditions_section, thresholds_section
+from dzdesign.report.summary import further_record, headline, key_figures, sets_in_words, valve_name
 from dzdesign.verify.verification import Verification, evidence_files
 
 REPORT_NAME = "report.html"
 NO_OUTPUTS = MadeOutputs()
 
 
-def report_of_folder(folder: Path, logo: str = "", firmware: Path | None = None) -> Report:
+def report_of_folder(folder: Path, logo: str = "", firmware: Path | None = None, *, full: bool = False) -> Report:
     """Make the report of an artefact folder: of evidence, of demo, or with valve.json or compensator.json.
 
-    `logo` is a data: address, `firmware` the folder that the evidence is of where that does not lie beside it.
+    `logo` is a data: address, `firmware` the folder that the evidence is of where that does not lie beside it. A `full`
+    one has nothing folded.
     """
     chain = read_chain(Path(folder), firmware)
     made_of = chain.places.get("compensator")
     outputs = outputs_in(chain.root, made_of.sha256) if chain.root and made_of else NO_OUTPUTS
-    return make_report(chain, outputs, logo)
+    return make_report(chain, outputs, logo, full=full)
 
 
 def with_report(verification: Verification, firmware: Path, output: Path) -> dict[str, bytes]:
@@ -48,26 +49,23 @@ def with_report(verification: Verification, firmware: Path, output: Path) -> dic
     return {**evidence_files(verification), REPORT_NAME: make_report(chain).html.encode()}
 
 
-def make_report(chain: Chain, outputs: MadeOutputs = NO_OUTPUTS, logo: str = "") -> Report:
+def make_report(chain: Chain, outputs: MadeOutputs = NO_OUTPUTS, logo: str = "", *, full: bool = False) -> Report:
     """Make the report of a chain of artefacts, and of the outputs that were made of its compensator.
 
-    `logo` is a data: address.
+    `logo` is a data: address. A `full` one has nothing folded.
     """
-    compensator = chain.compensator
+    compensator, evidence = chain.compensator, chain.evidence
     curves = characteristic_curves(chain.valve, chain.assessment, chain.curves)
-    loops = chain.evidence.closed_loop.pressures if chain.evidence else ()
+    loops = evidence.closed_loop.pressures if evidence else ()
     found = characteristic_quantities(chain.valve, chain.assessment, loops, curves)
-    lot, figures = lot_figures(chain), key_figures(chain, found)
-    if lot and chain.evidence:  # the last of them, the inputs, is of the C code and not of a valve
-        lot, figures = (*lot, figures[-1]), figures[:-1]
+    hues = pressure_hues((*(each.dp_MPa for each in curves), *(each.dp_MPa for each in loops)))
     with figure_style():
         sections = {
-            **_sections(chain),
+            **_sections(chain, hues),
             **outputs_sections(chain, outputs),
             "characteristic": characteristic_section(found, chain.recorded_units),
-            "conditions": conditions_section(chain.valve, chain.assessment),
         }
-        lead = characteristic_figure(curves, chain.recorded_units)
+        lead = characteristic_figure(curves, chain.recorded_units, hues)
     name = valve_name(chain.valve.record) if chain.valve else ""
     page = Page(
         title=name or _title(chain),
@@ -75,33 +73,37 @@ def make_report(chain: Chain, outputs: MadeOutputs = NO_OUTPUTS, logo: str = "")
         lead=lead,
         logo=logo,
         verdict=with_outputs(headline(chain), outputs, chain),
-        record=tuple(chain.valve.record.items()) if chain.valve else (),
-        figures=figures,
-        lot=lot,
+        record=tuple(further_record(chain.valve.record).items()) if chain.valve else (),
+        figures=key_figures(chain, found),
+        of_figures=sets_in_words(found, chain.recorded_units),
+        lot=lot_figures(chain),
         carrier=carrier_of(compensator) if compensator and compensator.lot else "",
         template="valve.html.jinja",
-        sections=sections,
+        sections={name: section for name, section in sections.items() if not section.is_empty},
         missing=chain.missing,
         not_counted=not_counted(compensator),
         law=account_of(compensator.law) if compensator else None,
+        full=full,
     )
     return replace(report_of(page), outputs=outputs)
 
 
-def _sections(chain: Chain) -> dict[str, Section]:
+def _sections(chain: Chain, hues: PressureHues) -> dict[str, Section]:
     """Return every section by its anchor."""
-    compensator = chain.compensator
+    compensator, evidence = chain.compensator, chain.evidence
     sections = {
-        **valve_sections(chain.valve, compensator),
+        "conditions": conditions_section(chain.valve, chain.assessment),
+        "thresholds": thresholds_section(chain.valve, compensator, evidence),
         "budget": budget_section(compensator),
-        "law": law_section(compensator),
-        "integers": integers_section(compensator),
+        "law": law_section(compensator, hues),
         "inputs": inputs_section(chain),
-        "loop": loop_section(chain),
-        "checks": checks_section(chain.evidence),
+        "loop": loop_section(chain, hues),
+        **checks_sections(evidence),
         "warnings": warnings_section(chain.valve, compensator),
         "provenance": provenance_section(chain),
     }
+    if evidence:
+        sections["plant"] = plant_section(evidence)
     if compensator:
         sections["remaining"] = remaining_section(compensator)
     if compensator and compensator.lot:
@@ -149,8 +151,9 @@ def _check(output: MadeOutput) -> Cell:
     if output.changed:
         return Cell(text="✗ CHANGED", kind="bad", more=output.changed)
     if output.holds is None and not output.evidence:
-        return Cell(text="? NOT VERIFIED", kind="open")
-    tried = f"{whole(output.inputs)} {'input' if output.inputs == 1 else 'inputs'} tried"
+        return Cell(text="? NOT VERIFIED", kind="open", more=_how_to_verify(output))
+    # Such as without Octave: none was tried, and the fault says so.
+    tried = f"{whole(output.inputs)} {'input' if output.inputs == 1 else 'inputs'} tried" if output.inputs else ""
     more = "; ".join(filter(None, [output.fault, tried, output.evidence]))
     return replace(verdict(output.holds), more=more)
 
@@ -158,8 +161,8 @@ def _check(output: MadeOutput) -> Cell:
 def with_outputs(headline: Headline, made: MadeOutputs, chain: Chain) -> Headline:
     """Return the verdict of a report, which speaks of a C firmware, with what is to be said of the outputs.
 
-    It is not good if one of them is wrong, or was not verified; each is named. Where there is no C firmware and no
-    evidence of one, the verdict is of the outputs.
+    It is not good if one of them is wrong. One that was not verified turns no verdict on another: it has its own line,
+    with the command. Where there is no C firmware and no evidence of one, the verdict is of the outputs.
     """
     others = _beside_firmware(made, chain)
     if wrong := [each for each in others if each.is_wrong]:
@@ -169,20 +172,24 @@ def with_outputs(headline: Headline, made: MadeOutputs, chain: Chain) -> Headlin
             text = f"{counted(len(wrong), 'output')} NOT to be used: {names}. {text}"
         return replace(headline, kind="bad", text=text, reasons=(*headline.reasons, *map(_reason, wrong)))
     untried = [each for each in others if each.holds is None]
-    reasons = tuple(_reason(each) for each in untried if each.fault)
     if made.listed and not (chain.firmware or chain.evidence):
         held = ", ".join(each.place for each in made.listed if each.holds)
         if not untried:
             return replace(headline, kind="good", text=f"Every requirement holds of {held}; no C firmware is here")
         text = _named(untried) + (f"; every requirement holds of {held}" if held else "")
-        return replace(headline, kind="open", text=text, reasons=reasons)
-    if headline.kind != "good" or not untried:
-        return headline
-    return replace(headline, kind="open", text=f"{_named(untried)}. {headline.text}", reasons=reasons)
+        return replace(headline, kind="open", text=text, reasons=tuple(map(_reason, untried)))
+    return replace(headline, cautions=(*headline.cautions, *map(_reason, untried)))
 
 
 def _reason(output: MadeOutput) -> str:
-    return f"{output.verdict}: {output.place} ({output.kind}): {output.changed or output.fault}"
+    """Return an output's verdict with why, and how to have it where there is none."""
+    why = output.changed or output.fault or _how_to_verify(output)
+    return f"{output.verdict}: {output.place} ({output.kind}): {why}"
+
+
+def _how_to_verify(output: MadeOutput) -> str:
+    name = output.place.removesuffix("/")
+    return f"`dzdesign verify {name} -o {name}_evidence`"
 
 
 def _named(untried: Sequence[MadeOutput]) -> str:

@@ -297,7 +297,7 @@ def test_the_page_is_in_the_units_of_the_recordings_where_the_compensator_is_kno
 
 def test_the_api_takes_the_options_of_the_command():
     options = {each.name for each in arguments_of_command("calibration")} - {"read"}
-    assert set(inspect.signature(api.calibration).parameters) == options
+    assert set(inspect.signature(api.calibration).parameters) == {*options, "config"}
     assert set(inspect.signature(api.read_calibration).parameters) == {"file", "compensator"}
     for function in (api.calibration, api.read_calibration):
         assert re.search(r"\n\n *Raises\n *------\n", function.__doc__)

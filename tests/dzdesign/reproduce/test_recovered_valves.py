@@ -1,4 +1,4 @@
-"""Recovered valves, Fig. 6 in both readings, the oil, and a deliberate error in derivation's law."""
+"""Recovered valves, and a deliberate error in derivation's law."""
 
 from dataclasses import replace
 
@@ -10,13 +10,13 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.derivation import law as laws
 from dzdesign.derivation import symbols as s
-from dzdesign.derivation.account.published import FIRST, SIMULATION
+from dzdesign.derivation.account.published import FIRST
 from dzdesign.design.designing import design
 from dzdesign.identify.valve.model import ValveModel
-from dzdesign.reproduce import explanations, numbers
-from dzdesign.reproduce.explanations import DISPLACEMENT, DISPLACEMENT_DEAD_ZONE
-from dzdesign.reproduce.recovered_valves import AtRest, half_digit, printed_at, recover, recover_valves
-from dzdesign.reproduce.runs import ValveRuns, run_chain, run_valve
+from dzdesign.reproduce.law_numbers import half_digit
+from dzdesign.reproduce.product_results import product_results
+from dzdesign.reproduce.recovered_valves import METER_START_L_MIN, AtRest, printed_at, recover, recover_valves
+from dzdesign.reproduce.runs import run_chain, run_valve
 from dzdesign.verify.closed_loop.loop import ClosedLoop, RampSequence
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
 from tests.support.synthetic import needs_compiler
@@ -25,18 +25,13 @@ pytestmark = [pytest.mark.slow, needs_compiler]
 PAPER_LAW = laws.law("paper")
 
 
-def not_run(valve):
-    """A valve of which nothing was run: what is said of it at rest."""
-    return ValveRuns(valve=valve, ramps={}, duty_percent=0.0, zero_band_percent=0.0, transition_percent=0.0)
-
-
 @pytest.mark.parametrize("place", [0, 1, 2])
 def test_a_recovered_valve_has_its_printed_figures_at_rest(place):
     """By the figures themselves, another way than the equations solved for them."""
     valve = recover_valves()[place]
     for dp_MPa in (1.0, 5.0):
         rest, printed = AtRest(valve.plant, dp_MPa), printed_at(valve.published, dp_MPa)
-        seen = rest.opens_V + valve.level_L_min / rest.flow_per_volt
+        seen = rest.opens_V + METER_START_L_MIN / rest.flow_per_volt
         for ours, text in ((10 * seen, printed.dead_zone_percent), (float(rest.flow_L_min(10.0)), printed.flow)):
             assert abs(ours - float(text)) < 1e-3 * half_digit(text)
     if place == 0:
@@ -57,41 +52,14 @@ def test_the_plant_at_rest_is_the_compiled_plant():
 def test_figures_that_no_valve_can_have_are_refused():
     impossible = replace(FIRST, flow1="60")  # more than the orifice passes at five times the pressure drop
     with pytest.raises(RequirementError, match="first valve can't be recovered"):
-        recover(impossible, recover_valves()[0].plant, 0.6)
+        recover(impossible, recover_valves()[0].plant)
 
 
 def test_the_rounding_of_the_print_moves_a_parameter_as_far_as_is_said():
     simulated, first, _ = recover_valves()
-    moved = recover(replace(FIRST, dead_zone1_percent="51.74"), simulated.plant, 0.6)
+    moved = recover(replace(FIRST, dead_zone1_percent="51.74"), simulated.plant)
     change = moved.plant.pressure_force_N_MPa - first.plant.pressure_force_N_MPa
     assert 0 < abs(change) <= first.rounding["pressure_force_N_MPa"]
-
-
-# --- Fig. 6 --------------------------------------------------------------------------------------------------
-
-
-def test_the_paper_contradicts_itself_only_where_both_readings_fail():
-    rows = list(numbers.of_the_displacement(not_run(recover_valves()[0])))
-    told = {(row.quantity, row.dp_MPa) for row in rows if "contradicts itself" in row.reason}
-    assert told == {(DISPLACEMENT_DEAD_ZONE, 5.0)} and all(row.holds for row in rows)
-    assert "only with overlap" in explanations.displacement(DISPLACEMENT, 5.0).text
-    assert "within the rounding" in explanations.displacement(DISPLACEMENT_DEAD_ZONE, 1.0).text
-
-
-def test_a_dead_zone_that_overlap_can_have_is_no_contradiction(monkeypatch):
-    """Seeded: 61 % of travel at 5 MPa, which Eq. (24) makes of the printed flows."""
-    wrong = replace(SIMULATION, displacement_dead_zone_rises_percent="7")
-    monkeypatch.setattr(explanations, "SIMULATION", wrong)
-    assert "only with overlap" in explanations.displacement(DISPLACEMENT_DEAD_ZONE, 5.0).text
-
-
-# --- section 4.3 ---------------------------------------------------------------------------------------------
-
-
-def test_the_oil_does_what_the_equations_say():
-    """By the density alone: no threshold moves."""
-    (dead_zone,) = numbers.of_the_oil(not_run(recover_valves()[1]))
-    assert 0 < dead_zone.value < 0.2 and dead_zone.agrees is False and dead_zone.holds
 
 
 # --- a deliberate error in derivation's law ------------------------------------------------------------------
@@ -143,6 +111,6 @@ def test_the_papers_numbers_catch_a_wrong_law_in_the_c(identified, monkeypatch, 
     firmware = generate(compensator, "host")
     write_folder(tmp_path / "firmware", firmware.files, firmware.manifest)
     assert check_all_inputs(tmp_path / "firmware").holds
-    runs = run_valve(valve, ClosedLoop(valve.plant, tmp_path / "firmware", compensator), compensator)
-    unexplained = [number.quantity for number in numbers.numbers_of_valve(runs) if number.holds is False]
-    assert bool(unexplained) == (error != "none"), unexplained
+    runs = run_valve(valve, ClosedLoop(valve.plant, tmp_path / "firmware", compensator))
+    faults = [fault for result in product_results([runs]) for fault in result.faults]
+    assert bool(faults) == (error != "none"), faults

@@ -1,4 +1,4 @@
-"""`dzdesign reproduce`: nothing agrees that was fitted, nothing is missed without a reason that reaches so far."""
+"""`dzdesign reproduce`: the paper against its law, the product on its valves, and readings that were rejected."""
 
 import copy
 import json
@@ -7,7 +7,7 @@ from dataclasses import replace
 from fractions import Fraction
 from itertools import islice
 from pathlib import Path
-from types import SimpleNamespace
+from random import Random
 
 import pytest
 
@@ -23,11 +23,11 @@ from dzdesign.design.options import DesignOptions
 from dzdesign.identify.plots.frame import saved
 from dzdesign.identify.plots.style import plot_style
 from dzdesign.identify.valve.model import ValveModel
-from dzdesign.reproduce import figures, numbers, recovered_valves, runs
+from dzdesign.reproduce import figures, law_numbers, runs
 from dzdesign.reproduce.artefact import Reproduction
-from dzdesign.reproduce.explanations import Reason
+from dzdesign.reproduce.law_numbers import Law, half_digit, rejected_readings
 from dzdesign.reproduce.recovered_valves import recover_valves
-from dzdesign.reproduce.runs import DIRECT, PRODUCT, WITHOUT_BETA
+from dzdesign.reproduce.runs import DIRECT, PRODUCT
 from dzdesign.verify.closed_loop.loop import ClosedLoop, LoopRun, RampSequence
 from dzdesign.verify.closed_loop.plant import read_plant
 from dzdesign.verify.closed_loop.ramps import FLOW_SHARE, dead_zone
@@ -97,59 +97,113 @@ def test_the_valves_are_tested_at_the_papers_pressure_drops_only(reproduced):
 
 
 def test_rounding_of_a_print_is_half_its_last_digit():
-    assert [recovered_valves.half_digit(text) for text in ("15", "53.5", "0.95")] == pytest.approx([0.5, 0.05, 0.005])
+    assert [half_digit(text) for text in ("15", "53.5", "0.95")] == pytest.approx([0.5, 0.05, 0.005])
 
 
-# --- agreement, and reasons ----------------------------------------------------------------------------------
+# --- (A): the paper against its law --------------------------------------------------------------------------
+
+#: What is missed, and whether the paper contradicts itself there; the oil is an assumption that is nearly so.
+MISSED = {
+    ("simulation", "spool's dead zone", 5.0): True,
+    ("first valve", "dead zone with", 5.0): True,
+    ("first valve", "largest flow with", 5.0): True,
+    ("first valve", "largest flow, about", 5.0): True,
+    ("first valve", "dead zone over oil temperature", 3.0): False,
+    ("second valve", "duty cycle at 2 V with", 1.0): True,
+}
 
 
-def test_only_what_is_predicted_agrees_and_every_miss_has_its_reason(reproduced):
-    numbers = document_of(reproduced)["numbers"]
-    for number in numbers:
-        where = f"{number['valve']}: {number['quantity']} at {number['dp_MPa']}"
-        assert number["tolerance"], where
-        if number["agrees"] is False:
-            low, high = number["explained"]
-            assert number["reason"] and low <= number["value"] <= high, where
-        if number["kind"] == "fitted":  # where the valve was recovered, the closed loop shows it
-            assert number["agrees"], where
-    kinds = [number["kind"] for number in numbers]
-    assert [kinds.count(kind) for kind in ("fitted", "predicted")] == [13, 26]
+def place_of(number):
+    return number.valve, number.quantity, number.dp_MPa
+
+
+def test_of_twenty_predicted_numbers_fourteen_agree_and_each_miss_is_argued():
+    rows = list(law_numbers.law_numbers())
+    assert len(rows) == 20 and sum(row.agrees for row in rows) == 14
+    assert {place_of(row): row.contradiction for row in rows if not row.agrees} == MISSED
+    assert all(bool(row.reason) is not row.agrees and row.holds for row in rows)
 
 
 #: What the paper and the bench say of their errors: the meter, 0.5 % of 150 L/min; 100 records a second of 100 s.
 ERROR = {"L/min": 0.75, "%": 0.01, "V": 0.001, "mm": 0.0, "1/1000": 0.1}
 
 
-def test_no_range_is_wider_than_the_printed_digits_and_a_stated_error(reproduced):
+def test_no_range_is_wider_than_the_printed_digits_and_a_stated_error():
     """By another way than the rows': from what is printed and the unit alone."""
-    compared = 0
-    for number in document_of(reproduced)["numbers"]:
-        simulated = number["valve"] == "simulation"
-        low, high = number["allowed"]
-        error = 0.0 if simulated and number["unit"] == "L/min" else ERROR[number["unit"]]
-        if number["published"] == "none":
+    rows = [*law_numbers.law_numbers(), *rejected_readings()]
+    for row in rows:
+        simulated, (low, high) = row.valve == "simulation", row.allowed
+        error = 0.0 if simulated and row.unit == "L/min" else ERROR[row.unit]
+        if row.published == "none":
             assert low == 0 and high <= (0.005 if simulated else error)
-        elif "-" in number["published"]:
-            bottom, top = map(float, number["published"].split("-"))
+        elif "-" in row.published:
+            bottom, top = map(float, row.published.split("-"))
             assert low >= bottom - error - 1e-9 and high <= top + error + 1e-9
         else:
-            middle = float(number["published"])
-            half = 0.5 * 10.0 ** -len(number["published"].partition(".")[2]) + error
-            assert middle - half - 1e-9 <= low < middle < high <= middle + half + 1e-9, number["quantity"]
-        compared += 1
-    assert compared == 39
+            middle = float(row.published)
+            half = 0.5 * 10.0 ** -len(row.published.partition(".")[2]) + error
+            assert middle - half - 1e-9 <= low < middle < high <= middle + half + 1e-9, row.quantity
+    assert len(rows) == 28
+
+
+@pytest.mark.parametrize("valve", VALVES, ids=lambda valve: valve.name)
+def test_no_number_within_the_digits_leaves_the_range_that_is_carried_along(valve):
+    """The range is of the corners; a number between them could lie outside if a formula turned back."""
+    random, states = Random(5), (Law.left1, lambda law: law.zero(law.offset0), Law.flat1_V, lambda law: law.duty(0.2))
+    for state in states:
+        _, (low, high) = law_numbers.of_the_law(valve, state)
+        for _ in range(200):
+            between = [random.uniform(-1, 1) for _ in range(6)]
+            assert low - 1e-9 <= state(law_numbers.law_of(valve, between)) <= high + 1e-9
+
+
+def test_the_law_leaves_at_the_reference_what_is_printed_there():
+    """Eq. (14) forwards: the drive at the printed dead zone is the valve's own dead zone."""
+    for valve in VALVES:
+        law = law_numbers.law_of(valve, (0,) * 6)
+        drive = law.offset0 + (1 - law.offset0) * float(valve.residual_percent) / 100
+        assert drive == pytest.approx(float(valve.dead_zone0_percent) / 100)
+
+
+@pytest.mark.parametrize(("reading", "agree"), [(0.3, 12), (0.4, 14), (0.5, 14), (0.59, 14), (0.6, 13), (0.8, 12)])
+def test_the_flow_at_which_dead_zones_are_read_is_where_most_agree(monkeypatch, reading, agree):
+    of_the_law = law_numbers.of_the_law
+    monkeypatch.setattr(law_numbers, "of_the_law", lambda valve, state: of_the_law(valve, state, reading=reading))
+    assert sum(row.agrees for row in law_numbers.law_numbers()) == agree
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong"),
+    [
+        ("offset1", property(lambda law: law.offset0)),  # beta left out
+        ("offset0", property(lambda law: law.read0 - law.left0)),  # Eq. (14) without its gain
+        ("travel", property(lambda law: 1 - law.read0)),
+    ],
+)
+def test_a_wrong_law_agrees_with_less(monkeypatch, name, wrong):
+    monkeypatch.setattr(Law, name, wrong)
+    assert sum(row.agrees for row in law_numbers.law_numbers()) < 14
 
 
 def test_a_miss_for_no_reason_is_exit_status_one(reproduced, monkeypatch, tmp_path, capsys):
     """Seeded: reasons are forgotten."""
-    row = numbers.row
-    monkeypatch.setattr(numbers, "row", lambda *given, reason=None, **more: row(*given, **more))
+    row = law_numbers._row
+    monkeypatch.setattr(law_numbers, "_row", lambda *given, **more: row(*given, **{**more, "reason": ""}))
     assert again(reproduced[1], monkeypatch, tmp_path) == 1
     out = capsys.readouterr().out
-    assert "18 MISSED FOR NO REASON" in out and " ".join(out.split()).count("NOBODY KNOWS WHY") == 18
+    assert "6 MISSED FOR NO REASON" in out and " ".join(out.split()).count("NOBODY KNOWS WHY") == 6
     assert again(reproduced[1], monkeypatch, tmp_path, "--json") == 1
     assert json.loads(capsys.readouterr().out)["holds"] is False
+
+
+def test_every_rejected_reading_is_ruled_out_and_the_chosen_one_would_not_be():
+    rows = list(rejected_readings())
+    assert len(rows) == 8 and all(row.holds for row in rows)
+    chosen = replace(rows[-1], range=(1.527, 1.664))  # the displacement with overlap
+    assert not chosen.holds
+
+
+# --- (B): the product ----------------------------------------------------------------------------------------
 
 
 def tampered(chains, place, drive, scale, *, at_MPa=5.0):
@@ -163,58 +217,32 @@ def tampered(chains, place, drive, scale, *, at_MPa=5.0):
 
 
 @pytest.mark.parametrize(
-    ("place", "drive", "scale", "at_MPa", "quantity"),
+    ("place", "drive", "scale", "at_MPa", "fault"),
     [
-        (0, PRODUCT, 0.99, 5.0, "largest flow with"),
-        (1, DIRECT, 0.9, 1.0, "largest flow without"),
-        (1, PRODUCT, 0.9, 5.0, "largest flow with"),  # misses as it is; the reason does not reach so far
-        (1, PRODUCT, 1.1, 5.0, "largest flow with"),
-        (1, PRODUCT, 0.2, 1.0, "dead zone with"),
-        (2, PRODUCT, 0.3, 5.0, "dead zone with"),
-        # Those were explained as well, by reasons that reached from zero to what is printed, or to the meter's error.
-        (1, PRODUCT, 0.98, 5.0, "largest flow with"),
-        (1, DIRECT, 0.98, 5.0, "largest flow, about"),
-        (1, PRODUCT, 0.9, 1.0, "dead zone with"),
+        (0, PRODUCT, 0.9, 5.0, "ideal line"),
+        (1, DIRECT, 0.9, 1.0, "another dead zone"),
+        (1, PRODUCT, 0.9, 5.0, "largest flow"),
+        (1, PRODUCT, 1.1, 5.0, "largest flow"),
+        (1, PRODUCT, 0.9, 1.0, "ideal line"),
+        (2, PRODUCT, 0.3, 5.0, "ideal line"),
     ],
 )
-def test_a_reason_explains_no_more_than_it_says(
-    reproduced, monkeypatch, tmp_path, capsys, place, drive, scale, at_MPa, quantity
-):
-    """Seeded: flows that are off by 1 to 80 %."""
+def test_a_flow_that_is_off_is_a_fault(reproduced, monkeypatch, tmp_path, capsys, place, drive, scale, at_MPa, fault):
+    """Seeded: flows that are off by 10 to 70 %."""
     chains = tampered(reproduced[1], place, drive, scale, at_MPa=at_MPa)
     assert again(chains, monkeypatch, tmp_path, "--json") == 1
-    unexplained = {
-        (number["quantity"], number["dp_MPa"])
-        for number in json.loads(capsys.readouterr().out)["numbers"]
-        if number["holds"] is False
-    }
-    assert (quantity, at_MPa) in unexplained
+    (wrong,) = [each for each in json.loads(capsys.readouterr().out)["product"] if each["faults"]]
+    assert wrong["dp_MPa"] == at_MPa and any(fault in each for each in wrong["faults"])
 
 
-def test_a_flow_at_zero_command_is_not_explained(reproduced, monkeypatch, tmp_path, capsys):
-    """Seeded: the product opens the valve at zero command, with beta and without."""
+def test_a_flow_at_zero_command_is_a_fault(reproduced, monkeypatch, tmp_path, capsys):
+    """Seeded: the product opens the valve at zero command."""
     ours = list(reproduced[1])
     ramps = dict(ours[1].runs.ramps)
-    for drive in (PRODUCT, WITHOUT_BETA):
-        ramps[drive, 5.0] = replace(ramps[drive, 5.0], q_largest_L_min=ramps[drive, 5.0].q_largest_L_min + 0.78)
+    ramps[PRODUCT, 5.0] = replace(ramps[PRODUCT, 5.0], q_largest_L_min=ramps[PRODUCT, 5.0].q_largest_L_min + 0.01)
     ours[1] = replace(ours[1], runs=replace(ours[1].runs, ramps=ramps))
-    assert again(ours, monkeypatch, tmp_path, "--json") == 1
-    wrong = {each["quantity"] for each in json.loads(capsys.readouterr().out)["numbers"] if each["holds"] is False}
-    assert wrong == {"zero command without beta", "zero command with beta"}
-
-
-def a_number(kind, published, value, allowed, reason=None):
-    """A number of the first valve, as `row` makes it."""
-    runs = SimpleNamespace(valve=recover_valves()[1])
-    more = {"allowed": allowed, "tolerance": "digits", "reason": reason}
-    return numbers.row(runs, 3.0, "", "", published, kind, "valve", value, **more)
-
-
-def test_a_miss_holds_as_far_as_its_reason_reaches():
-    outside = a_number("predicted", "53.9", 54.1, (53.8, 54.0))
-    assert outside.agrees is False and outside.holds is False
-    reasoned = a_number("predicted", "53.9", 54.1, (53.8, 54.0), Reason("because", (54.0, 54.2)))
-    assert reasoned.holds and not replace(reasoned, value=54.3).holds and not reasoned.agrees
+    assert again(ours, monkeypatch, tmp_path) == 1
+    assert "WRONG, first valve, 5 MPa: flow passes at zero command" in " ".join(capsys.readouterr().out.split())
 
 
 # --- what is written and printed -----------------------------------------------------------------------------
@@ -228,7 +256,7 @@ def test_the_document_fits_its_schema(reproduced):
     document = json.loads(content)
     assert problems("reproduction", document) == []
     spoilt = copy.deepcopy(document)
-    del spoilt["numbers"][0]["by"]
+    del spoilt["law"][0]["range"]
     assert problems("reproduction", spoilt) != []
 
 
@@ -244,20 +272,17 @@ def test_the_page_shows_what_is_printed(reproduced, monkeypatch, tmp_path, capsy
 
 
 def test_the_readme_shows_what_is_found(reproduced):
-    found = {(each["valve"], each["dp_MPa"], each["quantity"]): each for each in document_of(reproduced)["numbers"]}
+    found = {(each["valve"], each["dp_MPa"]): each for each in document_of(reproduced)["product"]}
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     rows = [line.strip("| ").split(" | ") for line in readme.splitlines() if re.match(r"\| .*valve, \d MPa", line)]
-    for name, uncompensated, paper, product, ideal in rows:
+    for name, without, paper, product, ideal, zero in rows:
         valve, pressure = name.split(", ")
-        place = valve, float(pressure[0])
-        without, with_law = (found[(*place, f"dead zone {kind}")] for kind in ("without", "with"))
-        assert (uncompensated, paper) == (f"{without['published']} %", f"{with_law['published']} %")
-        assert (product, ideal) == (f"{with_law['value']:.1f} %", f"{with_law['ideal_line']:.1f} %")
-        largest = float(found[(*place, "largest flow without")]["published"])
-        assert with_law["ideal_line"] == pytest.approx(100 * 0.6 / largest, abs=1e-4)
-    assert len(rows) == 3
-    zero = found["first valve", 5.0, "zero command without beta"]
-    assert (zero["published"], zero["value"]) == ("1.6", 0.0)
+        row = found[valve, float(pressure[0])]
+        assert (without, paper) == (f"{row['published_without']} %", f"{row['published']} %")
+        assert (product, ideal) == (f"{row['dead_zone']:.1f} %", f"{row['ideal_line']:.1f} %")
+        assert zero == f"{row['zero_L_min']:g}"
+        assert row["ideal_line"] == pytest.approx(100 * 0.6 / float(row["published_largest"]), abs=1e-4)
+    assert len(rows) == 4
 
 
 def onset(run: LoopRun) -> float:
@@ -314,7 +339,7 @@ def test_published_numbers_stand_in_one_place():
     printed = {value for valve in VALVES for name in valve.__slots__ if (value := getattr(valve, name))}
     # What is printed as a change of 0.1 mm is used as what it makes; a tenth may be anything.
     printed = printed - {SIMULATION.stroke_falls_mm} | {SIMULATION.stroke1_mm}
-    sources = set(Path(numbers.__file__).parent.glob("*.py"))
+    sources = set(Path(law_numbers.__file__).parent.glob("*.py"))
     sources = {source for source in sources if "figure" not in source.name}  # widths of lines
     assert len(sources) > 4
     for source in sources:

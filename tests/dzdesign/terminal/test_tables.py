@@ -7,7 +7,7 @@ import pytest
 from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.identify.valve.left_out import LeftOut, left_out_in_words
 from dzdesign.identify.valve.model import lag_in_words
-from dzdesign.report.sections.valve import valve_sections
+from dzdesign.report.sections.valve import conditions_section
 from dzdesign.terminal.tables import print_valve, short_source
 
 
@@ -47,7 +47,8 @@ def test_page_and_report_have_it(example_valve, capsys):
     words = example_valve.meter.lag_in_words()
     assert "±" in words or "longer" in words
     assert words in capsys.readouterr().out
-    assert any(words in str(line) for line in valve_sections(example_valve, None)["data"].lines)
+    (table,) = conditions_section(example_valve, None).tables
+    assert any(words in cell.text for row in table.rows for cell in row)
 
 
 def test_many_parts_of_one_reason_share_a_line_of_the_log():

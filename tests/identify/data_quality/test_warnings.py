@@ -101,7 +101,7 @@ class TestSimulated:
             assert of_recording == reach_of_certificate(compensator)
             assert [text.startswith("SIMULATED") for text in others] == [True] * simulated
             html = make_report(shelf).html
-            assert ("SIMULATED recordings" in html[: html.index('<section id="data">')]) is simulated
+            assert ("SIMULATED recordings" in html[: html.index('<section id="characteristic">')]) is simulated
 
     @pytest.mark.parametrize("whole", [True, False])
     def test_a_warning_taken_out_hides_no_simulation(self, tmp_path, capsys, wording, whole):
@@ -154,7 +154,7 @@ class TestBranchOrder:
             html = make_report(shelf).html
             words = re.sub("<[^>]*>|`", "", html)
             assert bool(said) is accepted
-            assert ("ACCEPTED warning, branch-order" in html[: html.index('<section id="data">')]) is accepted
+            assert ("ACCEPTED warning, branch-order" in html[: html.index('<section id="characteristic">')]) is accepted
             assert ("refuses it unless it is accepted, which it was (--accept)" in words) is accepted
 
     def test_a_valve_in_order_costs_nothing_of_it(self):

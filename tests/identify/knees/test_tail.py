@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dzdesign.identify.knees.characteristic import _with_censored
-from dzdesign.identify.knees.gated_line import fit_line
+from dzdesign.identify.knees.gated_line import straight_line
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.side import identify_side
 from tests.support.synthetic import L_MIN, Truth, synthetic_ramp
@@ -44,10 +44,10 @@ def test_the_line_of_a_tail_is_the_one_of_all_its_samples(floor):
     u = np.linspace(5 + floor / 2, 5 + 1.5 * floor if floor else 6.0, 4000)  # from the floor to three times that
     y = 2.0 * (u - 5.0) + sigma * rng.standard_normal(u.size)
     seen = y >= floor if floor else np.ones(u.size, dtype=bool)
-    slope, zero = fit_line(*_with_censored(u[seen], y[seen], u[~seen], floor, sigma))
+    slope, zero = straight_line(*_with_censored(u[seen], y[seen], u[~seen], floor, sigma))
     assert slope == pytest.approx(2.0, abs=0.15) and zero == pytest.approx(5.0, abs=0.03)
     if floor:
-        assert abs(fit_line(u[seen], y[seen])[1] - 5.0) > 0.06
+        assert abs(straight_line(u[seen], y[seen])[1] - 5.0) > 0.06
 
 
 def test_a_drop_out_far_above_the_floor_is_not_filled_in():

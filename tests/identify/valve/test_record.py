@@ -170,17 +170,17 @@ def test_each_valve_of_a_list_has_its_own_beside_that_of_all(here, wording):
         valves_of(Path("lot.csv"), None, ())
 
 
-def test_the_report_shows_it_under_the_verdict_and_as_text(here):
+def test_the_report_shows_it_under_the_title_and_as_text(here):
     from dzdesign.report.valve_report import report_of_folder
 
     valve = identify([synthetic_ramp(1.0, Truth(noise=0.02), ramp_s=20, rate_Hz=25)], record=HOSTILE)
     Path("lone").mkdir()
     Path("lone/valve.json").write_bytes(to_json_bytes(valve))
     html = report_of_folder(Path("lone")).html
-    head = Page(html[html.index('<div class="verdict') : html.index('<dl class="numbers">')])
-    assert all(name in head.text and text in head.text for name, text in HOSTILE.items())
-    assert len(head.of("dt")) == len(head.of("dd")) == len(HOSTILE)
+    head = Page(html[html.index('<p class="subtitle">') : html.index('<div class="verdict')])
+    assert all(f"{name}: {text}" in head.text for name, text in HOSTILE.items())
+    assert len([each for each in head.of("span") if each.get("class") == "entry"]) == len(HOSTILE)
     assert not Page(html).of("script") and not Page(html).of("img")
     assert [word for word in ("Tested by", "Checked by", "Date") if f"<p>{word}</p>" not in html] == []
     Path("lone/valve.json").write_text(to_json(sealed({**as_document(valve), "record": {}})))
-    assert 'class="record"' not in report_of_folder(Path("lone")).html
+    assert 'class="entry"' not in report_of_folder(Path("lone")).html

@@ -153,8 +153,9 @@ def test_the_flow_at_zero_is_judged_by_what_is_allowed(verified, compensator, fl
 
 
 def test_the_report_says_what_is_allowed_in_place_of_shut(verified):
-    table = scenarios_table(verified[0].evidence.scenarios, RecordedUnits())
+    scenarios = verified[0].evidence.scenarios
+    table = scenarios_table(scenarios, scenarios, RecordedUnits())
     required = {row[-1].text for row in table.rows if not row[-1].text.endswith(": not required")}
     assert required == {"0.35 L/min at most"}
-    bare = [replace(each, allowed_at_zero_L_min=None) for each in verified[0].evidence.scenarios]
-    assert "shut" in {row[-1].text for row in scenarios_table(bare, RecordedUnits()).rows}
+    bare = [replace(each, allowed_at_zero_L_min=None) for each in scenarios]
+    assert "shut" in {row[-1].text for row in scenarios_table(bare, bare, RecordedUnits()).rows}

@@ -276,6 +276,6 @@ def test_firmware_and_report_say_first_that_they_are_of_a_lot(common, batch, tmp
     assert f"Worst valve of the lot: {lot['worst']}" in head and f"{1e3 * lot['smallest_margin_V']:.3f} mV" in head
     carrier = head.index(f"Of one of these valves, {common.carrier}, the carrier")
     assert head.index("Worst valve of the lot") < carrier < head.index("Dead zone on opening")
-    for heading in ("Data and fit", "Thresholds", "Closed loop"):
+    for heading in ("Test conditions", "Thresholds", "Closed loop"):
         assert f"<h2>{heading} <small>of {common.carrier}, the carrier</small></h2>" in report
     assert document["lot_sha256"] in report[report.index('<section id="lot">') :]

@@ -38,8 +38,6 @@ def catalogue() -> dict[str, Entry]:
     return msgspec.toml.decode(files(__package__).joinpath("warnings.toml").read_bytes(), type=dict[str, Entry])
 
 
-
-
 def warn(code: str, source: str | None = None, case: str = "", **numbers: object) -> Warning_:
     """Return a warning of the catalogue, in the units of `shown_in`.
 

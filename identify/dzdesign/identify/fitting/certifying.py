@@ -112,11 +112,11 @@ def _certify(guarded: GuardedThreshold, tested: Tested, *, compared: bool) -> Ce
         if check.lack_of_fit_p is not None and check.lack_of_fit_p < REFUSED:
             asked, refused = None, check
     try:
-        bounded = _bound(scatter, asked, curvature, tested)
+        bounded = _offset_below(scatter, asked, curvature, tested)
     except NoCurveAgreesError:
         if asked is None:
             raise
-        bounded, refused = _bound(scatter, None, curvature, tested), check
+        bounded, refused = _offset_below(scatter, None, curvature, tested), check
     checks = []
     several = scatter.model.knots_MPa.size > 1
     for premise in PREMISES if several else ():
@@ -160,13 +160,13 @@ def _checked(scatter: Scatter, premise: Premise, curvature: float | None, tested
     estimated = premise == "smooth" and curvature is None
     p_value = None if estimated else lack_of_fit(scatter, curve=premise, curvature=curvature, direction=way)
     try:
-        left = _dead_zone_left(_bound(scatter, None if estimated else premise, curvature, tested), tested)
+        left = _dead_zone_left(_offset_below(scatter, None if estimated else premise, curvature, tested), tested)
     except InputError:
         left = None
     return PremiseCheck(premise=premise, lack_of_fit_p=p_value, dead_zone_over_u_max=left)
 
 
-def _bound(scatter: Scatter, asked: Premise | None, curvature: float | None, tested: Tested) -> _Bounded:
+def _offset_below(scatter: Scatter, asked: Premise | None, curvature: float | None, tested: Tested) -> _Bounded:
     """Return the bound under a premise, None: what bends from test to test, and the law's offset under it.
 
     Raises

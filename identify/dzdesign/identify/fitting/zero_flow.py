@@ -21,7 +21,7 @@ from dzdesign.identify.constants import L_MIN, Shown
 from dzdesign.identify.fit.scatter import LEAST_DEGREES
 from dzdesign.identify.knees.characteristic import FEWEST, SHUT_TO
 from dzdesign.identify.knees.described_tests import DescribedTests
-from dzdesign.identify.knees.gated_line import GATE, BranchShape, fit_line
+from dzdesign.identify.knees.gated_line import GATE, BranchShape, straight_line
 from dzdesign.identify.knees.line_fitting import DEGREES_OF_FREEDOM
 from dzdesign.identify.knees.profile import crossing
 from dzdesign.identify.options import IdentifyOptions
@@ -166,7 +166,7 @@ def _crossing(shape: BranchShape, readings: _Readings, flow: float, u_max: float
         u, y = readings.u[rows], readings.y[rows]
         if u.size < FEWEST or not np.ptp(u) > 0:
             continue
-        slope, zero = fit_line(u, y)
+        slope, zero = straight_line(u, y)
         noise = max(shape.noise, float(np.std(readings.residual[rows])))
         error = noise * math.sqrt(shape.variance_inflation / u.size)
         # A slope that does not stand out tells nothing of where the flow crosses.

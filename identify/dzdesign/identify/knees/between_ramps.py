@@ -16,7 +16,7 @@ import numpy as np
 from dzdesign.identify.constants import REFUSED
 from dzdesign.identify.fit.ramp_model import RampModel, Ramps, fit_ramp_model
 from dzdesign.identify.fit.scatter import Scatter, measure_scatter
-from dzdesign.identify.knees.gated_line import BranchShape, fit_line
+from dzdesign.identify.knees.gated_line import BranchShape, straight_line
 from dzdesign.identify.knees.noise import least_noise, least_step
 from dzdesign.identify.options import IdentifyOptions
 
@@ -132,7 +132,7 @@ def knees_of_ramps(
             u, y = branch.u[part][seen[part]], shape.prepared.y[part][seen[part]]
             if u.size < RAMP_SAMPLES or np.ptp(u) < RAMP_SPAN * width:
                 continue
-            slope, knee = fit_line(u, y)
+            slope, knee = straight_line(u, y)
             if slope <= 0:
                 continue
             lever = 1 / u.size + (u.mean() - knee) ** 2 / float(np.sum((u - u.mean()) ** 2))

@@ -5,7 +5,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from dzdesign.identify.knees.gated_line import GATE, BranchShape, DeadZone, GatedLine, PreparedBranch, Tail, fit_line
+from dzdesign.identify.knees.gated_line import (
+    GATE,
+    BranchShape,
+    DeadZone,
+    GatedLine,
+    PreparedBranch,
+    Tail,
+    straight_line,
+)
 from dzdesign.identify.knees.line_fitting import inflation_by_blocks
 from dzdesign.identify.knees.linear_region import StraightParts, find_straight_parts
 from dzdesign.identify.knees.noise import measure_roughness, robust_sigma, variance_inflation
@@ -101,7 +109,7 @@ def _without_outliers(u: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndar
     """Return the samples within `GATE` robust standard deviations of their line, in three rounds."""
     kept = np.ones(u.size, dtype=bool)
     for _ in range(3):
-        slope, zero = fit_line(u[kept], y[kept])
+        slope, zero = straight_line(u[kept], y[kept])
         residual = y - slope * (u - zero)
         sigma = robust_sigma(residual)
         inside = np.abs(residual - median(residual)) <= GATE * sigma
@@ -120,7 +128,7 @@ def _with_censored(
     would look a little soft. Expectation and maximisation take turns (a Tobit line); where flow below the floor is not
     credible, a zero is a drop-out.
     """
-    slope, zero = fit_line(u, y)
+    slope, zero = straight_line(u, y)
     if not u_cut.size or not slope > 0:
         return u, y
     from scipy.special import erfcx
@@ -132,7 +140,7 @@ def _with_censored(
         # The mean of a normal law cut off above: mu - sigma phi/Phi, by the scaled error function exact far below too.
         filled = line[credible] - sigma * math.sqrt(2 / math.pi) / erfcx(below)
         u_all, y_all = np.concatenate([u, u_cut[credible]]), np.concatenate([y, filled])
-        slope, zero = fit_line(u_all, y_all)
+        slope, zero = straight_line(u_all, y_all)
         if not slope > 0:
             return u, y
     return u_all, y_all
@@ -173,7 +181,7 @@ def _find_tail(
     if seen.sum() >= TAIL_SAMPLES and np.unique(u[seen]).size >= TAIL_LEVELS:
         u_tail, y_tail = _without_outliers(u[seen], read.y[seen])
         u_tail, y_tail = _with_censored(u_tail, y_tail, u[tail & ~seen], read.floor, line.sigma)
-        tail_slope, onset = fit_line(u_tail, y_tail)
+        tail_slope, onset = straight_line(u_tail, y_tail)
         if tail_slope > 0.1 * line.slope:  # else a notch or a leak: no line, so the chord below
             residual = y_tail - tail_slope * (u_tail - onset)
             sigma = math.sqrt(np.sum(residual**2) / (u_tail.size - 2))

@@ -20,7 +20,7 @@ STANDS_OUT = 2.6
 UNSEEN = 0.01
 
 
-def fit_line(u: np.ndarray, y: np.ndarray) -> tuple[float, float]:
+def straight_line(u: np.ndarray, y: np.ndarray) -> tuple[float, float]:
     """Return slope and zero of the least-squares line; a level one has no zero: the middle of its samples."""
     centre, height = float(u.mean()), float(y.mean())
     du = u - centre

@@ -7,7 +7,7 @@ import numpy as np
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import worded
 from dzdesign.identify.constants import Shown
-from dzdesign.identify.knees.gated_line import GATE, GatedLine, PreparedBranch, fit_line
+from dzdesign.identify.knees.gated_line import GATE, GatedLine, PreparedBranch, straight_line
 from dzdesign.identify.knees.noise import Roughness, measure_roughness
 from dzdesign.identify.knees.profile import crossing
 from dzdesign.identify.ramps.medians import median
@@ -27,7 +27,7 @@ DEGREES_OF_FREEDOM = BLOCKS - 2
 SHUT, JUMPED, JUMP = 0.05, 0.15, 3.0
 
 
-def lay_line(read: PreparedBranch, window: tuple[float, float]) -> GatedLine:
+def fit_knee(read: PreparedBranch, window: tuple[float, float]) -> GatedLine:
     """Lay a line through the samples between two shares of the largest flow.
 
     Raises
@@ -50,7 +50,7 @@ def lay_line(read: PreparedBranch, window: tuple[float, float]) -> GatedLine:
     u, y, censored = branch.u[inside], y[inside], branch.q[inside] < 0.5 * floor
     seen = ~censored
     _refuse_no_line(u[seen], window, floor, read.source)
-    slope, knee = fit_line(u[seen], y[seen])
+    slope, knee = straight_line(u[seen], y[seen])
     finest = FINEST_NOISE * read.y_max
     kept = np.ones(u.size, dtype=bool)
     for _ in range(ROUNDS):
@@ -63,7 +63,7 @@ def lay_line(read: PreparedBranch, window: tuple[float, float]) -> GatedLine:
             break
         seen = kept & ~censored
         _refuse_no_line(u[seen], window, floor, read.source)
-        slope, knee = fit_line(u[seen], y[seen])
+        slope, knee = straight_line(u[seen], y[seen])
     u_seen = u[seen]
     residual = _within_ramps(y[seen] - slope * (u_seen - knee), branch.ramp_of_samples[inside][seen])
     sigma = max(float(np.sqrt(np.sum(residual**2) / max(u_seen.size - 2, 1))), finest)
@@ -137,7 +137,7 @@ def line_through_levels(read: PreparedBranch, window: tuple[float, float]) -> Ga
     if not 0 < above <= beyond < u.size:
         return None
     levels = slice(above - 1, beyond + 1)
-    slope, knee = fit_line(u[levels], y[levels])
+    slope, knee = straight_line(u[levels], y[levels])
     step = float(np.diff(u[levels]).max())
     if slope <= 0 or not u[above - 1] - step <= knee <= u[beyond]:
         return None

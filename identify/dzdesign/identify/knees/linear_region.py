@@ -15,7 +15,7 @@ import numpy as np
 from dzdesign.core.errors import InputError
 from dzdesign.identify.constants import Shown
 from dzdesign.identify.knees.gated_line import GatedLine, PreparedBranch
-from dzdesign.identify.knees.line_fitting import lay_line
+from dzdesign.identify.knees.line_fitting import fit_knee
 from dzdesign.identify.knees.noise import correlation_upper_limit, robust_sigma, shared_correlation
 from dzdesign.identify.ramps.branches import Branch
 
@@ -66,7 +66,7 @@ def find_straight_parts(
     InputError
         If a window holds too few samples for a line, or the flow does not rise in it.
     """
-    narrow = [lay_line(read, window) for read in reads]
+    narrow = [fit_knee(read, window) for read in reads]
     for read, line in zip(reads, narrow, strict=True):
         if not line.slope > 0:
             raise InputError(
@@ -136,7 +136,7 @@ def _widest_straight(
             open_ = {index for index, line in enumerate(narrow) if lowest[index] < line.window[0]}
             windows = [(low, lines[-1].window[1]) for low, lines in zip(lowest, accepted, strict=True)]
         wider = {
-            index: lay_line(reads[index], windows[index]).with_shared_noise(correlation, blocks) for index in open_
+            index: fit_knee(reads[index], windows[index]).with_shared_noise(correlation, blocks) for index in open_
         }
         open_ = _going_on(accepted, wider, largest_shift)
         for index in open_:

@@ -22,8 +22,8 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.constants import FULL_SWEEP
-from dzdesign.identify.knees.gated_line import fit_line, prepare_branch
-from dzdesign.identify.knees.line_fitting import lay_line
+from dzdesign.identify.knees.gated_line import prepare_branch, straight_line
+from dzdesign.identify.knees.line_fitting import fit_knee
 from dzdesign.identify.knees.noise import robust_sigma
 from dzdesign.identify.knees.profile import crossing, flow_at_top, hole_within, smooth_profile
 from dzdesign.identify.options import IdentifyOptions
@@ -158,7 +158,7 @@ def floor_of_levels(u: np.ndarray, q: np.ndarray, shut: np.ndarray, ends: tuple[
     if not shut_noise < QUIET * noise:
         return 0.0
     zero = np.abs(q - np.median(shut)) <= max(3 * shut_noise, 0.1 * noise)
-    slope, knee = fit_line(u[straight & ~zero], q[straight & ~zero])
+    slope, knee = straight_line(u[straight & ~zero], q[straight & ~zero])
     zeros = np.bincount(index, weights=zero) / count
     mixed = (zeros > FEW) & (zeros < MANY)
     # A sharp edge passes this flow at a level that shows none at all.
@@ -242,7 +242,7 @@ def softness_of_filter(shift: float, at_level: float, ratio: float, *, rising: b
     x = np.linspace(-1.0 if rising else 1 + math.log(min(lowest, 1.0)), max(ratio * lowest, 1.0), FILTER_POINTS)
     reading = x + np.exp(-1 - x) if rising else np.where(x >= 1, x, np.exp(np.minimum(x, 1.0) - 1))
     tail = (reading >= lowest) & (reading <= ratio * lowest)
-    _, zero = fit_line(x[tail], reading[tail])
+    _, zero = straight_line(x[tail], reading[tail])
     return max(-zero * shift, 0.0)
 
 
@@ -311,7 +311,7 @@ def _knees(group: Sequence[Ramp], rising: bool, options: IdentifyOptions) -> tup
     for ramp, branch in whole if _two_rates([branch.rate for _, branch in whole]) else ():
         read = prepare_branch(branch, ramp.test, u_max=options.u_max, floor=floor)
         with suppress(InputError):
-            line = lay_line(read, options.knee_window)
+            line = fit_knee(read, options.knee_window)
             if line.slope > 0:
                 found.append((branch.rate, line.knee, line.knee_se))
     columns = np.array(found).reshape(-1, 3)

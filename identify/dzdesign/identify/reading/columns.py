@@ -134,7 +134,7 @@ def _labelled(table: Table, chosen: Mapping[str, str], clocks: ClockColumns) -> 
         columns = _labelled(table, others, clocks)
         if "time" in columns and table.in_file(columns["time"].label) == equal:
             return columns | {"time": replace(columns["time"], unit=unit or columns["time"].unit)}
-    columns = {quantity: _chosen_column(table, quantity, label) for quantity, label in chosen.items()}
+    columns = {quantity: _column_with_its_unit(table, quantity, label) for quantity, label in chosen.items()}
     taken = {each.label for column in columns.values() for each in column.every}
     edge = metering_edge(chosen)
     pressures = set(PRESSURES) if edge.ambiguous or edge.quantities else set()
@@ -173,13 +173,13 @@ def _labelled(table: Table, chosen: Mapping[str, str], clocks: ClockColumns) -> 
     return columns
 
 
-def _chosen_column(table: Table, quantity: str, text: str) -> Column:
+def _column_with_its_unit(table: Table, quantity: str, text: str) -> Column:
     """Return the column that was chosen: the whole text is its label, or else what stands before the last colon."""
     if quantity == "time" and (pair := table.pair(text)):
         return Column(label=AND.join(pair), unit="s")
     label, unit = _label_and_unit(table, text)
     if quantity == "u" and label not in table.labels and (two := _named_solenoids(table, text)):
-        column, less = (_chosen_column(table, quantity, each) for each in two)
+        column, less = (_column_with_its_unit(table, quantity, each) for each in two)
         if " ".join(column.unit.split()) != " ".join(less.unit.split()) and not same_unit(column.unit, less.unit, "u"):
             raise InputError(
                 f"'{table.path}': '{column.label}' is in '{column.unit}', '{less.label}' in '{less.unit}'; give both "

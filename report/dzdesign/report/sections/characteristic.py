@@ -1,6 +1,6 @@
 """Table and figure of the characteristic, in terms of ISO 10770-1: each quantity at each pressure drop of each side."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import chain
 from typing import TYPE_CHECKING, Any
@@ -10,17 +10,25 @@ import numpy as np
 from dzdesign.assess.options import SETS
 from dzdesign.assess.quantities import LIMITED, LOSS, QUANTITIES, LimitResult
 from dzdesign.core.recorded_units import RecordedUnits
-from dzdesign.identify.plots.style import CYCLE
-from dzdesign.report.figure import LIGHT, ReportFigure, csv_text, label_ends, legend_below, new_figure, to_report_figure
+from dzdesign.report.figure import (
+    LIGHT,
+    PressureHues,
+    ReportFigure,
+    csv_text,
+    label_ends,
+    legend_below,
+    new_figure,
+    to_report_figure,
+)
 from dzdesign.report.page import Cell, Section, Table, in_number_font, number, recorded
 from dzdesign.report.sections.quantities import (
+    IDEAL,
     KEYS,
     ORIGIN_WORDS,
     CharacteristicCurve,
     CharacteristicQuantities,
     Found,
     PressureQuantities,
-    same_pressure,
 )
 
 if TYPE_CHECKING:
@@ -33,6 +41,7 @@ NAMES = {
     "onset_closing": "Dead zone at the onset of flow, closing",
     "dead_zone_opening": "Dead zone at the reading flow, opening",
     "dead_zone_closing": "Dead zone at the reading flow, closing",
+    IDEAL: "Dead zone of an ideal line at that flow",
     "hysteresis": "Hysteresis",
     "linearity": "Linearity",
     "symmetry": "Symmetry of the flow gains",
@@ -45,6 +54,8 @@ NAMES = {
 }
 DECIMALS = {"%": 1, "L/min": 2, "L/min/V": 2}
 IN_RECORDED_UNITS = ("L/min", "L/min/V")
+#: Known of what is with the compensator alone, at times: then no arrow stands in their cells.
+OF_ONE_SET = (LOSS, IDEAL)
 #: Whose formulas stand below the table.
 EXPLAINED = ("hysteresis", "linearity", "symmetry", "gain")
 #: Verdict of a limit -> its word and kind.
@@ -66,11 +77,12 @@ def characteristic_section(found: CharacteristicQuantities, units: RecordedUnits
         if origin
     ]
     arrow = "Values without → with the compensator" if found.after else "Values without the compensator"
+    shown = {row[0].text for table in tables for row in table.rows}
     tables[-1] = replace(
         tables[-1],
         notes=(
             "Terms as in ISO 10770-1; the formulas are those of dzdesign, and no conformity is claimed.",
-            *(f"{NAMES[key]}: {QUANTITIES[key].formula}." for key in EXPLAINED),
+            *(f"{NAMES[key]}: {QUANTITIES[key].formula}." for key in EXPLAINED if NAMES[key] in shown),
         ),
     )
     flows = [each.reading_flow_L_min for each in found.pressures if each.reading_flow_L_min > 0]
@@ -111,7 +123,7 @@ def _row(
 def _pair(key: str, of: PressureQuantities, unit: str, units: RecordedUnits, *, driven: bool) -> Cell:
     """Return a quantity before and after, as far as either was recorded anywhere; marked where it misses its limit."""
     before, after = (_text(found.get(key), unit, units) for found in (of.before, of.after))
-    text = after if key == LOSS else before if not driven else f"{before} → {after}"
+    text = after if key in OF_ONE_SET and before == "–" else before if not driven else f"{before} → {after}"
     missed = key in of.limits and of.limits[key].holds is False
     return Cell(text=f"{text} ✗", kind="bad") if missed else in_number_font("–" if text == "– → –" else text)
 
@@ -153,46 +165,36 @@ WITH_WORDS = {"before": "without the compensator", "after": "with the compensato
 LEFT_ROOM = 16
 
 
-def characteristic_figure(curves: Sequence[CharacteristicCurve], units: RecordedUnits) -> ReportFigure | None:
+def characteristic_figure(
+    curves: Sequence[CharacteristicCurve], units: RecordedUnits, hues: PressureHues
+) -> ReportFigure | None:
     """Draw flow against command at every pressure drop; None without any curve."""
     curves = [curve for curve in curves if curve.branches]
     if not curves:
         return None
-    hues = _hues(curves)
     low, high = ("negative" in {curve.side for curve in curves}, "positive" in {curve.side for curve in curves})
-    figure = new_figure(3.75)
+    figure = new_figure(3.0)
     axes = figure.subplots()
     for curve in curves:
-        _draw(axes, curve, hues[id(curve)], units)
+        _draw(axes, curve, hues.of(curve.dp_MPa), units)
     axes.set(
         xlabel="command (% of full)", ylabel=f"flow Q ({units.label('L/min')})",
         xlim=(-100 - LEFT_ROOM if low else 0, 100 if high else 0),
         xticks=range(-100 if low else 0, 101 if high else 1, 20),
     )  # fmt: skip
     if low and high:
+        axes.margins(y=0.1)
         for line in (axes.axhline, axes.axvline):
             line(0, color=LIGHT["soft"], lw=0.8, zorder=1)
     elif high:
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]) if any(curve.samples for curve in curves) else 0.0)
-    if ends := _ends(curves, hues, units):
+    if ends := _ends(curves, units):
         label_ends(axes, ends)
         axes.annotate(f"dP ({units.label('MPa')})", (1 if high else 0, 1), xycoords="axes fraction", xytext=(5, 4),
                       textcoords="offset points", fontsize=8, color=LIGHT["soft"], annotation_clip=False)  # fmt: skip
     _name_lines(axes, curves)
     legend_below(figure, 3)
     return to_report_figure(figure, "characteristic", _caption(curves), _description(curves, units), _csv(curves))
-
-
-def _hues(curves: Sequence[CharacteristicCurve]) -> Mapping[int, str]:
-    """Return the hue of each curve: one a pressure drop, whichever side and set."""
-    known: list[float | None] = []
-    places = {}
-    for curve in sorted(curves, key=lambda each: (each.dp_MPa or 0.0)):
-        at = next((i for i, dp in enumerate(known) if same_pressure(dp, curve.dp_MPa)), len(known))
-        if at == len(known):
-            known.append(curve.dp_MPa)
-        places[id(curve)] = LIGHT[CYCLE[at % len(CYCLE)]]
-    return places
 
 
 def _draw(axes: "Axes", curve: CharacteristicCurve, hue: str, units: RecordedUnits) -> None:
@@ -204,16 +206,13 @@ def _draw(axes: "Axes", curve: CharacteristicCurve, hue: str, units: RecordedUni
                   zorder=2)  # fmt: skip
 
 
-def _ends(
-    curves: Sequence[CharacteristicCurve], hues: Mapping[int, str], units: RecordedUnits
-) -> list[tuple[float, float, str, str]]:
-    """Return the far end of a curve at each pressure drop of each side, with that pressure drop and its hue."""
-    ends: dict[tuple[str, str], tuple[float, float, str, str]] = {}
+def _ends(curves: Sequence[CharacteristicCurve], units: RecordedUnits) -> list[tuple[float, float, str]]:
+    """Return the far end of a curve at each pressure drop of each side, with that pressure drop."""
+    ends: dict[tuple[str, str], tuple[float, float, str]] = {}
     for curve in curves:
         if curve.dp_MPa is not None:
             name, flow = units.number(curve.dp_MPa, ".2f MPa"), units.convert(curve.end[1], "L/min")
-            place = 100.0 if curve.side == "positive" else -100.0
-            ends.setdefault((curve.side, name), (place, flow, name, hues[id(curve)]))
+            ends.setdefault((curve.side, name), (100.0 if curve.side == "positive" else -100.0, flow, name))
     return list(ends.values())
 
 

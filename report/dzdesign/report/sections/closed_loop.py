@@ -1,19 +1,27 @@
 """Section on the closed loop, and on the current loop of a drive by current."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 
 import numpy as np
 
 from dzdesign.core.display import NOT_CHECKED
 from dzdesign.core.recorded_units import RecordedUnits
-from dzdesign.identify.plots.style import CYCLE
 from dzdesign.report.artefacts import Chain
-from dzdesign.report.figure import LIGHT, ReportFigure, label_ends, side_words, titled_axes, to_report_figure
+from dzdesign.report.figure import (
+    LIGHT,
+    PressureHues,
+    ReportFigure,
+    label_ends,
+    side_words,
+    titled_axes,
+    to_report_figure,
+)
 from dzdesign.report.page import (
     Cell,
     Section,
     Table,
+    counted,
     in_number_font,
     in_units,
     number,
@@ -21,18 +29,21 @@ from dzdesign.report.page import (
     table_of,
     table_of_rows,
 )
+from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN
 from dzdesign.verify.closed_loop.ramps import Curves, closed_loop_name, csv_of
 from dzdesign.verify.current.results import CurrentLoopResult
 from dzdesign.verify.evidence import Evidence
 from dzdesign.verify.loop_results import ClosedLoopResult, PressureResult, ScenarioResult
 
+#: What a scenario measures whose flow is that of a command that was never taken away.
+OF_A_COMMAND = "flow_after_zero_command_L_min"
 #: Parameters of a plant that count where its edge does not.
 COIL_AND_SPOOL = (
     "K_a", "K_fi_V_A", "R_c_ohm", "r_p_ohm", "L_c_H", "K_i_N_A", "m_e_kg", "B_e_N_s_m", "K_et_N_m",
 )  # fmt: skip
 
 
-def loop_section(chain: Chain) -> Section:
+def loop_section(chain: Chain, hues: PressureHues) -> Section:
     """Return the section on the closed loop."""
     evidence = chain.evidence
     if evidence is None:
@@ -45,11 +56,36 @@ def loop_section(chain: Chain) -> Section:
     for side in sides:
         of_side = [each for each in loop.pressures if each.side == side]
         unseen = max((each.unseen_below_L_min for each in of_side if each.unseen_below_L_min), default=None)
-        figures.append(loop_figure(chain.curves[closed_loop_name(side)], side, len(sides) > 1, units, unseen))
+        curves = chain.curves[closed_loop_name(side)]
+        figures.append(loop_figure(curves, side, len(sides) > 1, units, hues, unseen))
+    # Without recordings of the compensated valve these numbers are those of the characteristic.
+    ramps = (loops_table(loop.pressures, units),) if chain.assessment else ()
+    exceptions = [each for each in worst_of_each(evidence.scenarios) if passes_flow(each)]
     return Section(
         figures=figures,
-        tables=(*facts(evidence, units), plant_table(loop), *current_tables(evidence.current_loop)),
-        lines=(_plant_line(loop),),
+        tables=(*ramps, scenarios_table(evidence.scenarios, exceptions, units)),
+        lines=(_plant_line(loop), *_scenarios_line(evidence.scenarios, len(exceptions), units)),
+    )
+
+
+def plant_section(evidence: Evidence) -> Section:
+    """Return the section with the constants of the plant, and the corners and faults of a current loop."""
+    return Section(tables=(plant_table(evidence.closed_loop), *current_tables(evidence.current_loop)))
+
+
+def _scenarios_line(scenarios: Sequence[ScenarioResult], exceptions: int, units: RecordedUnits) -> Iterator[str]:
+    """Say in a sentence what the scenarios beside the ramps show."""
+    if not scenarios:
+        return
+    kinds, way = len(worst_of_each(scenarios)), max(scenarios, key=lambda one: one.q_peak_at_zero_L_min)
+    found = "no flow at zero command at the end of any" if not exceptions else (
+        f"flow at zero command at the end of {exceptions}, in the table; none at the end of the other "
+        f"{kinds - exceptions}"
+    )  # fmt: skip
+    peak = way.in_words(way.q_peak_at_zero_L_min, units)
+    yield (
+        f"Beside ramps, {len(scenarios)} runs of {counted(kinds, 'scenario')}: {found}. On the way to zero command at "
+        f"most {peak} {units.label('L/min')} ({way.name})."
     )
 
 
@@ -57,7 +93,7 @@ def facts(evidence: Evidence, units: RecordedUnits) -> tuple[Table, ...]:
     """Return what the closed loop shows, the same on the page and on a terminal: ramps, readings, scenarios."""
     pressures = evidence.closed_loop.pressures
     ramps = (loops_table(pressures, units), readings_table(pressures, units)) if pressures else ()
-    scenarios = scenarios_table(evidence.scenarios, units)
+    scenarios = scenarios_table(evidence.scenarios, worst_of_each(evidence.scenarios), units)
     return (*ramps, scenarios) if scenarios else ramps
 
 
@@ -127,14 +163,26 @@ def loops_table(pressures: Sequence[PressureResult], units: RecordedUnits) -> Ta
     )
 
 
-def scenarios_table(scenarios: Sequence[ScenarioResult], units: RecordedUnits) -> Table | None:
-    """Return each scenario at the pressure drop where it is worst; None if there are none."""
-    if not scenarios:
+def passes_flow(result: PressureResult | ScenarioResult) -> bool:
+    """Return whether flow passes at zero command, beyond what may and what the recordings hide.
+
+    That of a command that was never taken away is none.
+    """
+    shown = result.q_zero_L_min >= (result.unseen_below_L_min or 0.0)
+    of_a_command = isinstance(result, ScenarioResult) and OF_A_COMMAND in result.figures
+    return shown and result.q_beyond_L_min > NO_FLOW_L_MIN and not of_a_command
+
+
+def scenarios_table(
+    scenarios: Sequence[ScenarioResult], shown: Sequence[ScenarioResult], units: RecordedUnits
+) -> Table | None:
+    """Return those scenarios that are shown at the pressures where each is worst; None if there are none."""
+    if not shown:
         return None
     flow = units.label("L/min")
     return table_of(
-        "Beside ramps: each scenario at the pressures where it is worst",
-        worst_of_each(scenarios),
+        "Scenarios beside ramps, at the pressures where each is worst",
+        shown,
         ("scenario", lambda one: Cell(text=one.name, more=_where(one, scenarios, units))),
         in_units("dP", "dp_MPa", ".2f MPa", units),
         in_units("behind the edge", "back_MPa", ".2f MPa", units),
@@ -214,25 +262,30 @@ NEAR_ZERO = 15.0
 
 
 def loop_figure(
-    curves: Curves, side: str, both: bool, units: RecordedUnits, unseen_below_L_min: float | None = None
+    curves: Curves,
+    side: str,
+    both: bool,
+    units: RecordedUnits,
+    hues: PressureHues,
+    unseen_below_L_min: float | None = None,
 ) -> ReportFigure:
     """Draw flow against command near zero, with the compensator, from closed_loop_<side>.csv.
 
     Below `unseen_below_L_min` nothing of the flow was recorded: the lines go on there as the first flows do.
     """
     ends = [name.removeprefix("q_with_") for name in curves if name.startswith("q_with_")]
-    figure, axes = titled_axes(3.6, side, both)
+    figure, axes = titled_axes(3.0, side, both)
     command, labels, top = curves["command_percent"], [], 0.0
     opening = np.arange(command.size) <= int(np.argmax(command))
-    for index, end in enumerate(ends):
-        hue, driven = LIGHT[CYCLE[index % len(CYCLE)]], units.convert(curves[f"q_with_{end}"], "L/min")
+    for end in ends:
+        dp_MPa = float(end.removesuffix("_MPa_L_min"))
+        hue, driven = hues.of(dp_MPa), units.convert(curves[f"q_with_{end}"], "L/min")
         for dash, branch in (("-", opening), ("--", ~opening)):
             inside = branch & (command <= NEAR_ZERO)
             axes.plot(command[inside], driven[inside], dash, color=hue, lw=1.5)
             top = max(top, float(driven[inside].max()))
             if dash == "-":
-                pressure = units.number(float(end.removesuffix("_MPa_L_min")), ".2f MPa")
-                labels.append((NEAR_ZERO, float(driven[inside][-1]), pressure, hue))
+                labels.append((NEAR_ZERO, float(driven[inside][-1]), units.number(dp_MPa, ".2f MPa")))
     for dash, word in (("-", f"opening, dP in {units.label('MPa')} at the end"), ("--", "closing")):
         axes.plot([], [], dash, color=LIGHT["soft"], label=word)
     axes.legend(loc="upper left")

@@ -1,4 +1,4 @@
-"""Sections on the compensator: its law in exact numbers, the integers of the C code, and the uncertainty budget."""
+"""Sections on the compensator: its law in exact numbers and in the C code's integers, and the uncertainty budget."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -18,13 +18,23 @@ from dzdesign.derivation.presentation.report import closure, compose
 from dzdesign.derivation.presentation.writers import HtmlWriter
 from dzdesign.design.certificate import above_in_words, below_in_words, reach_of_certificate
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.pressure_inputs import signals_in_words
 from dzdesign.design.side_law import ADDED_IN_FULL, Budget, BudgetLine
 from dzdesign.report.artefacts import laws_of
-from dzdesign.report.figure import LIGHT, ReportFigure, csv_text, side_words, titled_axes, to_report_figure
+from dzdesign.report.figure import (
+    LIGHT,
+    PressureHues,
+    ReportFigure,
+    csv_text,
+    side_words,
+    titled_axes,
+    to_report_figure,
+)
 from dzdesign.report.page import (
     Cell,
     Section,
     Table,
+    for_both_sides,
     in_number_font,
     number,
     recorded,
@@ -39,8 +49,8 @@ SHOWN_UNITS = {"mV": ".3g mV", "MPa": ".3g MPa"}
 BELOW_DP0 = {"hold": "β = 1, as in the paper", "extend": "β as tested"}
 
 
-def law_section(compensator: Compensator | None) -> Section:
-    """Return the section on the law; its derivation is added by the page."""
+def law_section(compensator: Compensator | None, hues: PressureHues) -> Section:
+    """Return the section on the law, its integers and signals; its derivation is added by the page."""
     if compensator is None:
         return Section(missing="No compensator is here: `dzdesign design` makes compensator.json.")
     laws, valve = laws_of(compensator), compensator.valve
@@ -59,18 +69,16 @@ def law_section(compensator: Compensator | None) -> Section:
         lines.append(f"Beyond the tests, {which}{below_in_words(side.certificate, valve.sides[name], units)}.")
         beyond = above_in_words(compensator.above, side.certificate, valve.sides[name], units)
         lines.append(f"Beyond the tests, {which}{beyond}.")
-    return Section(figures=tuple(law_figure(compensator, name, len(laws) > 1) for name in laws), lines=tuple(lines))
+    return Section(
+        figures=tuple(law_figure(compensator, name, len(laws) > 1, hues) for name in laws),
+        lines=for_both_sides(lines),
+        groups=(("What the codes stand for", tuple(signals_in_words(compensator))),),
+        tables=(rounding_table(compensator),),
+    )
 
 
 def _exact(value: Fraction) -> str:
     return f"{value.numerator}/{value.denominator} = {float(value):.5f}"
-
-
-def integers_section(compensator: Compensator | None) -> Section:
-    """Return the section on the integers of the C code; every number of it stands in its comments."""
-    if compensator is None:
-        return Section(missing="No compensator is here: `dzdesign design` makes compensator.json.")
-    return Section(tables=(rounding_table(compensator),))
 
 
 def rounding_table(compensator: Compensator) -> Table:
@@ -139,7 +147,7 @@ def account_of(law_name: str) -> LawAccount:
     )
 
 
-def law_figure(compensator: Compensator, name: str, both: bool) -> ReportFigure:
+def law_figure(compensator: Compensator, name: str, both: bool, hues: PressureHues) -> ReportFigure:
     """Draw the output against the command at the ends of the tested interval, and the threshold's bound."""
     exact = ExactLaw(compensator, compensator.valve.sign_of(name))
     u_max, certificate = float(compensator.u_max_V), laws_of(compensator)[name].certificate
@@ -149,12 +157,12 @@ def law_figure(compensator: Compensator, name: str, both: bool) -> ReportFigure:
     bare = units.convert(np.array([0.0, u_max]), "V")
     axes.plot([0, 100], bare, ":", color=LIGHT["soft"], lw=1.3, label="without compensator")
     rows = []
-    for dp_MPa, dash, hue in ((low, "-", "blue"), (high, "--", "vermilion")):
+    for dp_MPa, dash in ((low, "-"), (high, "--")):
         corners = exact.corners(exact.betas(round(compensator.signals.pair(exact.sign).dp_code(Fraction(dp_MPa)))))
         percent = [100 * away / exact.span for away, _ in corners]
         volts = [u_max * float(count) / exact.compare_max for _, count in corners]
         shown = units.convert(np.array(volts), "V")
-        axes.plot(percent, shown, dash, color=LIGHT[hue], lw=1.8, label=f"at {units.text(dp_MPa, '.2f MPa')}")
+        axes.plot(percent, shown, dash, color=hues.of(dp_MPa), lw=1.8, label=f"at {units.text(dp_MPa, '.2f MPa')}")
         rows += [[round(dp_MPa, 4), round(x, 4), round(y, 6)] for x, y in zip(percent, volts, strict=True)]
     bound = units.convert(min(compensator.valve.sides[name].certified[certificate.guard].u_lower_V), "V")
     axes.axhline(bound, color=LIGHT["green"], lw=1.2, ls="-.", label="least lower bound of the threshold")

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 
-from dzdesign.core.artefact_types import Artefact, schema_of
+from dzdesign.core.artefact_types import THIS_TOOL, Artefact, schema_of
 from dzdesign.core.display import NOT_CHECKED, NOT_REQUIRED
 from dzdesign.core.documents import written_by
 from dzdesign.core.errors import InputError, and_more
@@ -11,7 +11,7 @@ from dzdesign.design import position_loop
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs import lines_of_tests
 from dzdesign.design.costs_at_tests import CostAtTest, costs_at_tests
-from dzdesign.design.pressure_inputs import signals_in_words
+from dzdesign.design.firmware_manifest import setting_words
 from dzdesign.design.redesign import without_sensors
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.artefacts import ROLES, Chain
@@ -22,6 +22,7 @@ from dzdesign.report.page import (
     Table,
     counted,
     finding,
+    for_both_sides,
     in_number_font,
     in_units,
     table_of,
@@ -39,7 +40,7 @@ ROWS = 40
 
 
 def warnings_section(valve: ValveModel | None, compensator: Compensator | None) -> Section:
-    """Return the section on warnings, costs, signals, and what is not proved."""
+    """Return the section on warnings, costs, and what is not proved."""
     accepted = compensator.options.get("accept", "") if compensator and compensator.options else ""
     codes = accepted.replace(",", " ").split()
     warnings = []
@@ -47,12 +48,10 @@ def warnings_section(valve: ValveModel | None, compensator: Compensator | None) 
         source = f"{warning.source}: " if warning.source else ""
         end = ", which it was (--accept)" if warning.code in codes else ""
         warnings.append(f"[{warning.code}] {source}{warning.text}{end}")
-    signals = signals_in_words(compensator) if compensator else []
     return Section(
         groups=(
-            ("Warnings of the recordings", tuple(warnings) or (("None.",) if valve else ())),
-            ("What the design costs", other_costs(compensator) if compensator else ()),
-            ("What the codes stand for", tuple(signals)),
+            ("Warnings of the recordings", for_both_sides(warnings) or (("None.",) if valve else ())),
+            ("What the design costs", for_both_sides(other_costs(compensator)) if compensator else ()),
         )
     )
 
@@ -79,7 +78,16 @@ def provenance_section(chain: Chain) -> Section:
         for caption, what, rows in of_hashes
         if rows
     ]
-    return Section(tables=(_artefacts_table(chain), *tables))
+    return Section(tables=(_artefacts_table(chain), *tables), lines=tuple(_options(chain)))
+
+
+def _options(chain: Chain) -> Iterator[str]:
+    """Yield the options that each artefact was made with."""
+    stated = chain.valve.options if chain.valve else None
+    if stated:
+        yield f"Options of identify: {', '.join(setting_words(stated.texts))}."
+    if chain.compensator and chain.compensator.options:
+        yield f"Options of design: {', '.join(setting_words(chain.compensator.options))}."
 
 
 def _artefacts_table(chain: Chain) -> Table:
@@ -92,11 +100,13 @@ def _artefacts_table(chain: Chain) -> Table:
             sources = ", ".join(each.source for each in artefact.made_from) or "–"
             if role == "valve":
                 sources = counted(len(artefact.made_from), "recording")
+            # The page states its own version; an artefact of another one says so.
+            other = "" if tool == THIS_TOOL else f"made by {tool.name} {tool.version}"
             digest = Cell(text=place.sha256, kind="hash")
-            rows.append((label, place.name, digest, f"{tool.name} {tool.version}", sources))
+            rows.append((label, Cell(text=place.name, more=other), digest, sources))
         elif written_by(schema_of(kind)):
-            rows.append((label, Cell(text="missing or not used", kind="open"), "", "", ""))
-    columns = ("artefact", "file", "SHA-256", "made by", "made from")
+            rows.append((label, Cell(text="missing or not used", kind="open"), "", ""))
+    columns = ("artefact", "file", "SHA-256", "made from")
     return table_of_rows("Each artefact with the SHA-256 of its bytes, and what it was made from", columns, rows)
 
 
@@ -104,7 +114,7 @@ def remaining_section(compensator: Compensator) -> Section:
     """Return the section with a table a side, what a fixed offset would leave, and a position loop's largest gain."""
     tables = [_table(compensator, sign, costs) for sign, costs in _costs(compensator)]
     loops = (f"{line[:1].upper()}{line[1:]}." for line in position_loop.in_words(compensator))
-    return Section(tables=tables, lines=(*_fixed(compensator), *loops))
+    return Section(tables=tables, lines=for_both_sides((*_fixed(compensator), *loops)))
 
 
 def _fixed(compensator: Compensator) -> Iterator[str]:
@@ -179,21 +189,28 @@ def _onset(branch: str, units: RecordedUnits) -> Callable[[CostAtTest], Cell]:
     return cell
 
 
-def checks_section(evidence: Evidence | None) -> Section:
-    """Return the section with every requirement."""
+def checks_sections(evidence: Evidence | None) -> dict[str, Section]:
+    """Return the sections "missed", on what does not hold or was not checked, and "checks", on all else."""
     if evidence is None:
-        return Section(missing=f"{NOT_CHECKED}: no evidence is here; `dzdesign verify` makes it.")
-    rows: list[tuple[Cell | str, ...]] = []
+        return {"checks": Section(missing=f"{NOT_CHECKED}: no evidence is here; `dzdesign verify` makes it.")}
+    held: list[tuple[Cell | str, ...]] = []
+    missed: list[tuple[Cell | str, ...]] = []
     for check in evidence.checks:
-        rows.append((verdict(check.holds), check.name, finding(check.text)))
-        rows += [(NOT_REQUIRED, check.name, finding(found)) for found in check.not_required]
+        (held if check.holds else missed).append((verdict(check.holds), check.name, finding(check.text)))
+        held += [(NOT_REQUIRED, check.name, finding(found)) for found in check.not_required]
     untried = untried_requirements(evidence)
     for each in untried:
         label = label_of_untried(each)
         sign = Cell(text=f"? {label}", kind="open" if label == NOT_CHECKED else "")
-        rows.append((sign, each.title, finding(f"to try it: {each.how}")))
-    caption = f"{len(evidence.checks)} requirements tried, {len(untried)} not"
-    return Section(tables=(table_of_rows(caption, ("verdict", "requirement", "figures"), rows),))
+        held.append((sign, each.title, finding(f"to try it: {each.how}")))
+    columns = ("verdict", "requirement", "figures")
+    count = len(evidence.checks)
+    counts = f"{count - len(missed)} of {count} requirements hold, {len(untried)} not tried"
+    of_missed = table_of_rows("Requirements that do not hold, or were not checked", columns, missed)
+    return {
+        "checks": Section(tables=(table_of_rows(counts, columns, held),)),
+        "missed": Section(tables=(of_missed,) if missed else ()),
+    }
 
 
 # --- of how many valves a lot setting is, and the worst of them ----------------------------------------------

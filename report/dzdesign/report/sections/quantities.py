@@ -4,7 +4,7 @@ Measured ones lead: an assessment of recordings. Without one, those without the 
 and identified, and those with it are the simulated closed loop's.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -19,6 +19,7 @@ from dzdesign.identify.ramps.pooling import SAME_PRESSURE
 from dzdesign.identify.valve.model import SIDES, ValveModel
 from dzdesign.identify.valve.ramp_result import TestResult
 from dzdesign.identify.valve.recorded_curve import RecordedBranch
+from dzdesign.report.figure import PressureHues
 from dzdesign.verify.closed_loop.ramps import Curves, closed_loop_name
 from dzdesign.verify.loop_results import PressureResult
 
@@ -30,10 +31,12 @@ ORIGIN_WORDS: Mapping[Origin, str] = {
 BRANCHES = ("opening", "closing")
 #: Command and flow, and those of the samples.
 Branch = tuple[Sequence[float], Sequence[float], Sequence[float], Sequence[float]]
+#: What a straight line from zero command to the largest flow would read at the reading flow.
+IDEAL = "ideal_line"
 #: Keys in the order of a test report.
 KEYS = (
-    "onset_opening", "onset_closing", "dead_zone_opening", "dead_zone_closing", "hysteresis", "linearity", "symmetry",
-    "gain", "largest_flow", "flow_at_zero",
+    "onset_opening", "onset_closing", "dead_zone_opening", "dead_zone_closing", IDEAL, "hysteresis", "linearity",
+    "symmetry", "gain", "largest_flow", "flow_at_zero",
 )  # fmt: skip
 
 
@@ -165,6 +168,15 @@ def same_pressure(one: float | None, other: float | None) -> bool:
     if one is None or other is None:
         return one is other
     return abs(one - other) <= SAME_PRESSURE * max(one, other)
+
+
+def pressure_hues(pressures_MPa: Iterable[float | None]) -> PressureHues:
+    """Return the shades of pressure drops, of which those that count as one have one."""
+    known: list[float] = []
+    for dp_MPa in sorted(each for each in pressures_MPa if each is not None):
+        if not known or not same_pressure(known[-1], dp_MPa):
+            known.append(dp_MPa)
+    return PressureHues(tuple(known))
 
 
 # --- what they come to -----------------------------------------------------------------------------------------
@@ -304,6 +316,7 @@ def _of_loop(loop: PressureResult) -> dict[str, Found]:
         "onset_closing": Found(100 * loop.residual_closing),
         "dead_zone_opening": Found(100 * loop.reading_opening),
         "dead_zone_closing": Found(100 * loop.reading_closing),
+        IDEAL: Found(100 * loop.ideal_line),
         "flow_at_zero": Found(loop.q_zero_L_min) if seen else Found(None, unseen),
     }
 

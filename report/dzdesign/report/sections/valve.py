@@ -1,6 +1,6 @@
-"""Sections on the identified valve: test conditions, data and fit, thresholds, beta over the pressure drop."""
+"""Sections on the identified valve: test conditions and data, thresholds over the pressure drop."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -11,13 +11,12 @@ from dzdesign.assess.options import SETS
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.core.units import chance
 from dzdesign.design.compensator import Compensator
-from dzdesign.identify.plots.valve_curves import BOUND_NAME, draw_beta, draw_thresholds
+from dzdesign.identify.plots.valve_curves import BOUND_NAME, draw_thresholds
 from dzdesign.identify.valve.low_flow import IN_WORDS
 from dzdesign.identify.valve.model import ValveModel, lag_in_words
 from dzdesign.identify.valve.side_model import SideModel
 from dzdesign.report.artefacts import laws_of
 from dzdesign.report.figure import (
-    LIGHT,
     ReportFigure,
     csv_text,
     legend_below,
@@ -30,6 +29,7 @@ from dzdesign.report.page import (
     Section,
     Table,
     counted,
+    for_both_sides,
     in_number_font,
     in_units,
     recorded,
@@ -37,6 +37,7 @@ from dzdesign.report.page import (
     table_of_rows,
 )
 from dzdesign.report.sections.quantities import entry_of, measured_curve_of
+from dzdesign.verify.evidence import Evidence
 
 #: Nodes nearer to a test than this are in its interval, MPa.
 SAME_MPa = 1e-6
@@ -53,57 +54,48 @@ RECORDED = {
 }  # fmt: skip
 
 
-def valve_sections(valve: ValveModel | None, compensator: Compensator | None) -> dict[str, Section]:
-    """Return the sections "data", "thresholds" and "beta", of the guard of the compensator where there is one."""
+def thresholds_section(valve: ValveModel | None, compensator: Compensator | None, evidence: Evidence | None) -> Section:
+    """Return the section on the thresholds, of the guard of the compensator where there is one."""
     if valve is None:
-        gap = Section(missing="The valve is not here: `dzdesign identify` makes valve.json.")
-        return {"data": gap, "thresholds": gap, "beta": gap}
+        return Section(missing="The valve is not here: `dzdesign identify` makes valve.json.")
     both = len(valve.sides) > 1
-    thresholds, tables, betas = [], [], []
+    figures, tables, lines = [], [], []
     for name, side in valve.sides.items():
         law, units = laws_of(compensator).get(name), valve.recorded_units.of_side(name)
         guard = law.certificate.guard if law else side.certificate.guard
-        thresholds.append(thresholds_figure(side, guard, name, both, units))
+        figures.append(thresholds_figure(side, guard, name, both, units) if len(side.tests) > 1 else None)
         tables.append(thresholds_table(side, guard, f"Thresholds, {name} commands", units))
         if side.low_flow:
             tables.append(low_flow_table(side, f"Flows measured by hand, {name} commands", units))
-        betas.append(beta_figure(side, guard, name, both, compensator if law else None, units))
-    meter, units = valve.meter, valve.recorded_units
-    shown = units.in_words()
-    return {
-        "data": Section(
-            lines=(
-                f"{_ramp_tests(valve)}; full command {units.text(valve.u_max_V, 'g V')}.",
-                *([f"Units: {shown}; the files and the curves as CSV are in V, MPa and L/min."] if shown else []),
-                f"Flow meter: floor {units.text(meter.floor_L_min, '.2f L/min')}; {meter.lag_in_words()}.",
-                *([f"Recorded under {valve.dither_in_words}."] if valve.dither else []),
-                *(_trend(name, side, units.of_side(name)) for name, side in valve.sides.items()),
-                *(
-                    f"{name.capitalize()} commands, from ramp to ramp: "
-                    f"{side.certificate.repeatability.in_words(units)}."
-                    for name, side in valve.sides.items()
-                ),
-                *(f"{name.capitalize()} commands: not tested." for name in valve.untested_sides),
-            ),
-        ),
-        "thresholds": Section(
-            figures=thresholds,
-            tables=tables,
-            lines=(
-                *(f"Premise, {name} commands: {side.premise_in_words(units)}." for name, side in valve.sides.items()),
-                *(
-                    f"At the bounds, {name} commands: {side.none_in_words(side.certificate.guard, units)}."
-                    for name, side in valve.sides.items()
-                    if side.low_flow
-                ),
-                *(f"{warning.text}." for warning in valve.warnings if warning.code in (*ORDER, "low-flow")),
-            ),
-        ),
-        "beta": Section(
-            figures=betas,
-            missing="" if any(betas) else "One pressure drop was tested, so β is 1 and its trend is not known.",
-        ),
-    }
+        lines.append(f"Premise, {name} commands: {side.premise_in_words(units)}.")
+        if side.low_flow:
+            lines.append(f"At the bounds, {name} commands: {side.none_in_words(side.certificate.guard, units)}.")
+    if compensator:
+        lines += certificate_lines(compensator, evidence)
+    lines += [f"{warning.text}." for warning in valve.warnings if warning.code in (*ORDER, "low-flow")]
+    return Section(figures=figures, tables=tables, lines=for_both_sides(lines))
+
+
+def certificate_lines(compensator: Compensator, evidence: Evidence | None) -> Iterator[str]:
+    """Yield of each side what is certified, and by which margin the output at zero command lies under it."""
+    # A machine's or a lot's reserve is in the margin, too.
+    rounding = compensator.machine is None and not compensator.lot
+    for name, law in laws_of(compensator).items():
+        certificate, side = law.certificate, compensator.valve.sides[name]
+        units = compensator.valve.recorded_units.of_side(name)
+        found = [each.smallest_margin_V for each in (evidence.inputs if evidence else ()) if each.side == name]
+        margin = units.text(1e3 * min(found, default=float(certificate.smallest_margin_V)), ".3f mV")
+        of_c = f"of the C code{': rounding alone' if rounding else ''}; the statistical reserve is in the bound"
+        of_law = "of the exact law under the certified offset; the statistical reserve is in that offset"
+        low, high = map(float, certificate.dp_MPa)
+        interval = units.span(low, high, ".2f MPa")
+        declared = "" if certificate.zero_flow_L_min is None else f"; {side.zero_flow_in_words(units)}"
+        between = side.between_in_words(certificate.guard).removeprefix("between the tests: ")
+        yield (
+            f"Certificate, {name} commands: with {100 * certificate.confidence:g} % confidence the output at zero "
+            f"command stays below the {certificate.guard} threshold {interval}; "
+            f"smallest margin {margin} {of_c if found else of_law}{declared}; {between}."
+        )
 
 
 def _ramp_tests(valve: ValveModel) -> str:
@@ -143,11 +135,6 @@ def _trend(name: str, side: SideModel, units: RecordedUnits) -> str:
     )
 
 
-def _first_of(ramps: Sequence[str]) -> str:
-    """Return the first ramp of a test, and how many more there are; valve.json names them all."""
-    return f"{ramps[0]} and {len(ramps) - 1} more" if len(ramps) > 1 else ramps[0]
-
-
 def thresholds_table(side: SideModel, guard: str, title: str, units: RecordedUnits) -> Table:
     """Return the thresholds of each ramp test, with the lower bounds of the guarded one."""
     bounds = dict(zip(map(id, side.tests), side.certified[guard].u_lower_V, strict=True))
@@ -169,38 +156,31 @@ def thresholds_table(side: SideModel, guard: str, title: str, units: RecordedUni
         in_units("noise level", "noise_level_L_min", ".2f L/min", units),
         *(leaks if any(test.leak_L_min for test in side.tests) else ()),
         *(allowed if side.certificate.zero_flow_L_min is not None else ()),
-        ("ramp test", lambda test: _first_of(test.ramps)),
+        ("ramps", lambda test: in_number_font(str(len(test.ramps)))),
     )
 
 
 def thresholds_figure(side: SideModel, guard: str, name: str, both: bool, units: RecordedUnits) -> ReportFigure:
     """Draw the thresholds against the pressure drop, and what is certified of the guarded one."""
     curve = side.certified[guard]
-    several = len(side.tests) > 1
-
     def span(values: Sequence[float]) -> str:
         return units.span(min(values), max(values), ".3f V")
 
     nodes, bound = np.array(curve.bound_dp_MPa), np.array(curve.bound_V)
-    certified = several and curve.premise != "none"
+    certified = curve.premise != "none"
     least_to_next = [
         round(float(bound[(nodes >= low - SAME_MPa) & (nodes <= high + SAME_MPa)].min()), 7)
         for low, high in pairwise(curve.dp_MPa)
     ] if certified else []  # fmt: skip
-    figure, axes = titled_axes(3.8, name, both)
+    figure, axes = titled_axes(3.2, name, both)
     draw_thresholds(axes, side, curve, units)
     legend_below(figure, 4)
     return to_report_figure(
         figure,
         f"thresholds-{name}",
         f"Thresholds against the pressure drop{side_words(name, both)}. The {guard} threshold is guarded: the "
-        "output at zero command stays below "
-        + (
-            f"the {BOUND_NAME}, which is what the bounds of all tests together certify between the "
-            f"tests too. {curve.premise_in_words(units)}."
-            if several
-            else "its lower bound. One pressure drop was tested, and nothing is certified at another."
-        ),
+        f"output at zero command stays below the {BOUND_NAME}, which is what the bounds of all tests together certify "
+        "between the tests too.",
         f"Thresholds against the pressure drop: the {guard} threshold lies {span(curve.u_threshold_V)}, its lower "
         f"bound {span(curve.u_lower_V)}, the largest certified offset {span(curve.u_offset_V)}.",
         csv_text(
@@ -219,75 +199,12 @@ def thresholds_figure(side: SideModel, guard: str, name: str, both: bool, units:
     )  # fmt: skip
 
 
-def beta_figure(
-    side: SideModel, guard: str, name: str, both: bool, compensator: Compensator | None, units: RecordedUnits
-) -> ReportFigure | None:
-    """Draw beta between what the bounds allow and, where there is a compensator, its table of integers.
-
-    None of a valve tested at one pressure drop.
-    """
-    curve = side.certified[guard]
-    if len(curve.dp_MPa) < 2:
-        return None
-    dp, u_min0 = np.array(curve.dp_MPa), side.reference.u_min_V
-    figure, axes = titled_axes(3.6, name, both)
-    draw_beta(axes, side, curve, units)
-    rows: list[list[str | float | None]] = [
-        [f"identified {branch}", at, value, se, volts]
-        for branch, found in side.identified.items()
-        for at, value, se, volts in zip(found.dp_MPa, found.beta, found.beta_se, found.u_V, strict=True)
-    ]
-    rows += [
-        ["certified", at, round(volts / u_min0, 7), None, volts]
-        for at, volts in zip(curve.offset_dp_MPa, curve.offset_V, strict=True)
-    ]
-    if compensator:
-        where, nodes, of_the_C = _beta_table(compensator, name)
-        table = nodes * of_the_C / u_min0  # with a transition the C code counts from the opening threshold
-        near = (where >= dp[0] - 0.1 * np.ptp(dp)) & (where <= dp[-1] + 0.1 * np.ptp(dp))
-        shown = units.convert(where[near], "MPa")
-        axes.plot(shown, table[near], ".-", color=LIGHT["ink"], ms=4, lw=1, label="the C code's offset / u_min0")
-        rows += [
-            ["C", round(float(x), 6), round(float(y), 7), None, round(float(y * of_the_C), 7)]
-            for x, y in zip(where, nodes, strict=True)
-        ]
-    legend_below(figure, 3)
-    low, high = min(side.beta.beta), max(side.beta.beta)
-    shares = [volts / u_min0 for volts in curve.offset_V]
-    return to_report_figure(
-        figure,
-        f"beta-{name}",
-        f"β against the pressure drop{side_words(name, both)}: the identified thresholds over that at dP0, u_min0 = "
-        f"{units.text(u_min0, '.4f V')} (Eq. 5), with their error; and over the same u_min0 what is certified of the "
-        f"{guard} threshold, under which the law puts out its offset at zero command." + _about_the_table(compensator),
-        f"Identified beta lies between {low:.4f} and {high:.4f} {units.span(dp[0], dp[-1], '.2f MPa')}, the largest "
-        f"certified offset at {min(shares):.4f} to {max(shares):.4f} of u_min0.",
-        csv_text(("of", "dp_MPa", "beta", "beta_se", "u_V"), rows),
-    )
-
-
-def _about_the_table(compensator: Compensator | None) -> str:
-    if compensator is None:
-        return ""
-    holds = compensator.below_dp0 == "hold"
-    held = " Up to dP0 the C code holds what it has there, as the paper does." if holds else ""
-    return f"{held} The table in the C code is rounded down, so that it stays below the bound."
-
-
-def _beta_table(compensator: Compensator, name: str) -> tuple[np.ndarray, np.ndarray, float]:
-    """Return pressure drops (MPa) and betas at the nodes of the compensator's table, and its u_min0 (V)."""
-    law = laws_of(compensator)[name]
-    nodes = np.array(law.beta)
-    ahead = compensator.signals.pair(-1 if name == "negative" else 1).ahead
-    where = np.arange(nodes.size) * compensator.beta_step_codes * float(ahead.per_code_MPa)
-    return where, nodes / compensator.beta_denominator, float(law.u_min0_over_u_max * compensator.u_max_V)
-
-
 # --- test conditions -------------------------------------------------------------------------------------------
 
 
 def conditions_section(valve: ValveModel | None, assessment: Assessment | None) -> Section:
     """Return the section on how, with which meter and oil the ramps were recorded, with the compensator apart."""
+    lines = _data_lines(valve) if valve else ()
     if assessment:
         heads: tuple[str, ...] = ("without the compensator", "with the compensator")
         sets = [
@@ -319,7 +236,27 @@ def conditions_section(valve: ValveModel | None, assessment: Assessment | None) 
     hint = "".join(f"`identify --record \"{name} = ...\"` writes it into valve.json." for name in missing[:1])
     hint = f"Not recorded: {', '.join(missing)}. {hint}" if missing else ""
     table = table_of_rows("Recordings", ("", *heads), [(name, *map(_condition, texts)) for name, texts in rows])
-    return Section(tables=(table,), missing=hint, optional=True)
+    return Section(tables=(table,), lines=lines, missing=hint, optional=True)
+
+
+def _data_lines(valve: ValveModel) -> tuple[str, ...]:
+    """Return what was recorded, and what it shows of the valve beside its thresholds."""
+    units = valve.recorded_units
+    shown = units.in_words()
+    sides = for_both_sides(
+        line
+        for name, side in valve.sides.items()
+        for line in (
+            _trend(name, side, units.of_side(name)),
+            f"{name.capitalize()} commands, from ramp to ramp: {side.certificate.repeatability.in_words(units)}.",
+        )
+    )
+    return (
+        f"{_ramp_tests(valve)}; full command {units.text(valve.u_max_V, 'g V')}.",
+        *([f"Units: {shown}; the files and the curves as CSV are in V, MPa and L/min."] if shown else []),
+        *sides,
+        *(f"{name.capitalize()} commands: not tested." for name in valve.untested_sides),
+    )
 
 
 def _condition(text: str) -> Cell:
