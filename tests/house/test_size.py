@@ -12,19 +12,19 @@ from tests.support.paths import ROOT
 #: Of a room: lines of Python, files of Python, lines of templates, C programs, headers and tables.
 ROOM_SIZES = {
     "core": (2510, 15, 0),
-    "derivation": (4703, 28, 325),
-    "identify": (16161, 93, 1052),
+    "derivation": (4704, 28, 326),
+    "identify": (16184, 93, 1052),
     "assess": (1577, 8, 0),
-    "design": (7190, 31, 0),
-    "codegen": (7791, 50, 7921),
-    "verify": (11847, 62, 4524),
-    "report": (4421, 20, 532),
-    "dzdesign": (9164, 62, 165),
+    "design": (7224, 31, 0),
+    "codegen": (7798, 50, 7921),
+    "verify": (12027, 63, 4630),
+    "report": (4403, 20, 517),
+    "dzdesign": (9193, 62, 173),
 }
 #: Lines of Python of what is not shipped, and of the files that the tests compare with.
-TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 45842, 14530, 8554
+TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 46260, 14562, 8554
 #: Options of all commands together; an option of two commands counts twice.
-OPTIONS = 169
+OPTIONS = 171
 #: What a number may be above what is there, before it is to be lowered.
 SLACK = 0.02
 TEXTS = {".jinja", ".c", ".h", ".m", ".ld", ".toml", ".html", ".css", ".js", ".svg", ".md", ".txt"}
