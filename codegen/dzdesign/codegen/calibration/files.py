@@ -265,8 +265,8 @@ def _sides(built: BuiltFor) -> list[Values]:
     """Return the C that depends on the sign of command: ending of the names, and which way the signals count."""
     rises, falls = "u - side->band_end", "side->band_end - u"
     forward, back = (falls, rises) if built.has("FALLING") else (rises, falls)
-    positive = {"s": "", "text": "positive", "from_band": forward, "pad": "", **_pair(built, 1)}
-    negative = {"s": "_negative", "text": "negative", "from_band": back, "pad": " " * 9, **_pair(built, -1)}
+    positive = {"s": "", "text": "positive", "from_band": forward, **_pair(built, 1)}
+    negative = {"s": "_negative", "text": "negative", "from_band": back, **_pair(built, -1)}
     return [positive, negative] if built.has("BIPOLAR") else [positive]
 
 
@@ -322,9 +322,8 @@ def _interface(built: BuiltFor) -> list[Define]:
         define("DZ_SAMPLE_HZ", built.sample_Hz, "samples per second", "of the firmware's timer"),
         define("DZ_TICK_HZ", built.tick_Hz, "PWM periods per second", "of the firmware's timer"),
         define("DZ_BETA_STEP", built.beta_step, "codes of pressure drop between two nodes of beta", "a power of two"),
-        Define(symbol="DZ_WEIGHT_SHIFT", value=WEIGHT_SHIFT, equation="from weighted codes to codes of the sensor ahead",
-               engineering=f"1/2^{WEIGHT_SHIFT}", rounding="the difference is rounded down"),
-    ]  # fmt: skip
+        define("DZ_WEIGHT_SHIFT", WEIGHT_SHIFT, "from weighted codes to codes of the sensor ahead", "1/4096"),
+    ]
     if not built.fixed:
         found += [
             define("DZ_CALIBRATION_SHAPE", built.shape, "what this firmware is compiled for", shape),

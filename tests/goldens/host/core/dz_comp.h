@@ -77,8 +77,8 @@ static inline uint32_t dz_pressure_difference(const struct dz_calibration_side *
 }
 
 /* What dz_status() returns. */
-static inline uint32_t dz_status_of(const struct dz_calibration *block, uint32_t u, uint32_t p_a_adc,
-                                    uint32_t p_b_adc)
+static inline uint32_t dz_status_of(
+    const struct dz_calibration *block, uint32_t u, uint32_t p_a_adc, uint32_t p_b_adc)
 {
     const struct dz_calibration_side *side = &block->sides[0];
     /* The top bit is set if a code is outside its valid range, or the difference beyond its limits. */
