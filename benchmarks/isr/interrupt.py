@@ -30,7 +30,7 @@ REQUEST = CurrentRequest(
     converter=Converter(),
 )
 #: Goals: with a new sample, and without; a 25 MHz clock has 10 000 in a PWM period.
-LIMITS = {True: 315, False: 160}
+LIMITS = {True: 300, False: 160}
 #: The counter calls dz_comp: the core's own has another name here.
 ENTRY = """\
 #include "dz_hardware.h"

@@ -175,7 +175,7 @@ SEEDED = {
     "an implausible difference is no fault": (
         " | DZ_STATUS_DIFFERENCE));", "));"),
     "the law takes the pressures again": (
-        "p_b_adc, held)", "p_b_adc, all_ones(status & 14u))"),
+        "p_b_adc), held)", "p_b_adc), all_ones(status & 14u))"),
     "the status is silent": (
         "(gone & DZ_STATUS_WAITING) | ", ""),
 }  # fmt: skip

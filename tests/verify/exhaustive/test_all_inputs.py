@@ -118,13 +118,12 @@ def test_a_pair_of_pressures_that_is_not_its_difference_is_odd_and_not_wrong(pla
 @pytest.mark.parametrize("sign", [1, -1])
 def test_what_is_shown_is_checked_on_both_sides(full, sign):
     prepared, core = PreparedInputs(exact_law(full, sign)), CompiledCore(full, sign)
-    name = "dz_comp.c"
-    text = core.sources[name].decode()
-    for old, new, count in (
-        ("invalid_command(block, u) & DZ_STATUS_COMMAND", "invalid_command(block, u) & DZ_STATUS_ABOVE", "bad_status"),
-        ("tested_to - difference", "tested_to * 0u - difference", "bad_status"),
-        ("side->beta_shift & LARGEST_WIDE_SHIFT", "34u", "bad_betas"),
+    for name, old, new, count in (
+        ("dz_comp.h", "_command(block, u) & DZ_STATUS_COMMAND", "_command(block, u) & DZ_STATUS_ABOVE", "bad_status"),
+        ("dz_comp.h", "tested_to - difference", "tested_to * 0u - difference", "bad_status"),
+        ("dz_comp.c", "side->beta_shift & LARGEST_WIDE_SHIFT", "34u", "bad_betas"),
     ):
+        text = core.sources[name].decode()
         assert old in text
         found = core.edited(name, text.replace(old, new).encode()).check(prepared.sample(), sample=True)
         assert getattr(found, count) > 0

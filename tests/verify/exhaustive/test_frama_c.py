@@ -35,11 +35,11 @@ def test_no_place_of_the_core_and_the_drive_is_left_in_doubt(name, tmp_path):
 @pytest.mark.parametrize(
     ("file", "right", "wrong", "function"),
     [
-        # A node beyond the table.
+        # A node beyond the table; an inline function, of which each source has its own, has a number.
         ("dz_comp.c", "& DZ_CALIBRATION_NODE_MASK", "& 127u", "betas_at"),
         ("dz_comp.c", "(side->beta_shift & LARGEST_WIDE_SHIFT)", "(side->beta_shift + LARGEST_WIDE_SHIFT)", "dz_beta"),
-        ("dz_comp.c", "below = difference + block->reverse;",
-         "below = difference + block->reverse + (uint32_t)((int32_t)p_a_adc * 65536 * 0);", "dz_status"),
+        ("dz_comp.h", "below = difference + block->reverse;",
+         "below = difference + block->reverse + (uint32_t)((int32_t)p_a_adc * 65536 * 0);", "dz_status_of_0"),
         # An int of the host has 32 bits, that of the C28x 16: every value on the host stays what it was.
         ("dz_comp.c", "uint32_t from_band = u -", "uint32_t from_band = (uint32_t)((int)u * 16 / 16) -", "dz_comp"),
         ("dz_drive.c", "= drive->law;", "= (uint32_t)(drive->side * 32767 * 2 * 0) + drive->law;", "dz_drive_tick"),

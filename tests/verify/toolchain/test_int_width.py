@@ -199,7 +199,7 @@ def test_every_name_of_the_core_is_known(tmp_path, monkeypatch):
 
 #: Template, what stands there, and what somebody wrote instead; the form whose C has it.
 BUGS = {
-    "shift of a code": ("dz_comp.c", "(ahead << WEIGHT_SHIFT)", "((uint16_t)ahead << WEIGHT_SHIFT)", "bipolar"),
+    "shift of a code": ("dz_comp.h", "(ahead << DZ_WEIGHT", "((uint16_t)ahead << DZ_WEIGHT", "bipolar"),
     "int cast, shifted": ("dz_comp.c", "node[0].law * left", "(uint32_t)((int)left << 10)", "bipolar"),
     "product of codes": ("dz_comp.c", "const uint32_t u = u_adc;", "const uint32_t u = u_adc * 3 / 3;", "bipolar"),
     "sum of a law and a dither": (

@@ -45,7 +45,6 @@ from dzdesign.codegen.core.constants import (
     c_comment,
     current_fault_bits,
     defines,
-    difference_place,
     drive_status_constants,
     status_constants,
 )
@@ -191,27 +190,22 @@ def _rational(value: Fraction) -> str:
 
 def _constants(built: BuiltFor, numbers: CalibrationBlock | None) -> dict[str, list[Define]]:
     """Return the constants of each file, in the order of the files."""
-    shifts = [
-        Define(symbol="WEIGHT_SHIFT", value=WEIGHT_SHIFT, equation="from weighted codes to codes of the sensor ahead",
-               engineering=f"1/2^{WEIGHT_SHIFT}", rounding="the difference is rounded down"),
-        Define(symbol="BETA_STEP_SHIFT", value=built.beta_step.bit_length() - 1,
-               equation="the power of two in DZ_BETA_STEP", engineering=f"1/{built.beta_step}"),
-    ]  # fmt: skip
+    step_shift = Define(symbol="BETA_STEP_SHIFT", value=built.beta_step.bit_length() - 1,
+                        equation="the power of two in DZ_BETA_STEP", engineering=f"1/{built.beta_step}")  # fmt: skip
     found = {"dz_calibration.h": _interface(built)}
     if not built.fixed:
         node = "largest node: times DZ_BETA_STEP below 2^31"
         found["dz_calibration.h"] += _findings()
         found["dz_calibration.c"] = [
-            *shifts,
+            step_shift,
             _limit("LARGEST_NODE", largest_node(built.beta_step), "uint32", node),
             *(_limit(*each) for each in NAMED + (OF_CURRENT if built.has("CURRENT") else ())),
         ]
     found["dz_comp.c"] = [
-        *shifts,
+        step_shift,
         _limit("TOP_BIT", INT32_MAX + 1, "int64", "the top bit of a word, set where it stands for a negative number"),
         _limit("LARGEST_SHIFT", 31, "plain", "largest shift of a word of 32 bits"),
         _limit("LARGEST_WIDE_SHIFT", 63, "plain", "largest shift of 64 bits"),
-        difference_place(),
     ]
     found["dz_comp.h"] = status_constants(built.inputs)
     found["dz_drive.c"] = [
@@ -271,8 +265,8 @@ def _sides(built: BuiltFor) -> list[Values]:
     """Return the C that depends on the sign of command: ending of the names, and which way the signals count."""
     rises, falls = "u - side->band_end", "side->band_end - u"
     forward, back = (falls, rises) if built.has("FALLING") else (rises, falls)
-    positive = {"s": "", "text": "positive", "from_band": forward, "pad": "", **_pair(built, 1)}
-    negative = {"s": "_negative", "text": "negative", "from_band": back, "pad": " " * 9, **_pair(built, -1)}
+    positive = {"s": "", "text": "positive", "from_band": forward, **_pair(built, 1)}
+    negative = {"s": "_negative", "text": "negative", "from_band": back, **_pair(built, -1)}
     return [positive, negative] if built.has("BIPOLAR") else [positive]
 
 
@@ -328,6 +322,7 @@ def _interface(built: BuiltFor) -> list[Define]:
         define("DZ_SAMPLE_HZ", built.sample_Hz, "samples per second", "of the firmware's timer"),
         define("DZ_TICK_HZ", built.tick_Hz, "PWM periods per second", "of the firmware's timer"),
         define("DZ_BETA_STEP", built.beta_step, "codes of pressure drop between two nodes of beta", "a power of two"),
+        define("DZ_WEIGHT_SHIFT", WEIGHT_SHIFT, "from weighted codes to codes of the sensor ahead", "1/4096"),
     ]
     if not built.fixed:
         found += [

@@ -120,13 +120,6 @@ def current_fault_bits(*, two: bool) -> list[Define]:
     return [*_bits("DZ_CURRENT", ((place, *each) for place, each in bits), "the faults")]
 
 
-def difference_place() -> Define:
-    """Return the place of a status bit, by which the one above it is shifted down to be masked with it."""
-    place = list(STATUS_BITS).index("DIFFERENCE")
-    return Define(symbol="DIFFERENCE_PLACE", value=place, equation="place of DZ_STATUS_DIFFERENCE in the status word",
-                  engineering=f"bit {place}", rounding="a convention")  # fmt: skip
-
-
 def _bits(prefix: str, bits: Iterable[tuple[int, str, str]], of: str) -> Iterable[Define]:
     for place, name, text in bits:
         yield Define(symbol=f"{prefix}_{name}", value=1 << place, equation=f"bit {place} of {of}",

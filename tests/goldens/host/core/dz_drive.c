@@ -8,13 +8,13 @@
  * MISRA C:2012: nothing found by cppcheck 2.10 (--platform=avr8 --std=c99 --addon=misra) in this file.
  */
 
-#include "dz_drive.h"
-
-#include "dz_valve.h"
-
 #if defined(__TI_COMPILER_VERSION__) && !defined(DZ_CORE_IN_FLASH)
 #pragma SET_CODE_SECTION(".TI.ramfunc") /* without wait states; TI's linker files copy it at the start */
 #endif
+
+#include "dz_drive.h"
+
+#include "dz_valve.h"
 
 /* Unit of the ramped command, a code of command: 65536 (exact). */
 #define RAMP_UNIT UINT32_C(65536)
@@ -231,7 +231,7 @@ void dz_drive_sample(struct dz_drive *drive, uint16_t u_adc, uint16_t p_a_adc,
                      uint16_t p_b_adc)
 {
     const struct dz_calibration *block = &dz_valve;
-    const uint32_t status = dz_status(u_adc, p_a_adc, p_b_adc);
+    const uint32_t status = dz_status_of(block, u_adc, p_a_adc, p_b_adc);
     const int32_t asked = (int32_t)u_adc - (int32_t)block->command_zero;
     const uint32_t gone = no_command(block, drive, all_ones(status & DZ_STATUS_COMMAND), asked);
     const int32_t command = command_of(block, drive, asked, gone);
@@ -252,7 +252,7 @@ void dz_drive_sample(struct dz_drive *drive, uint16_t u_adc, uint16_t p_a_adc,
     drive->status = (uint16_t)(status | (gone & DZ_STATUS_WAITING) | (held & DZ_STATUS_HELD) |
                                ((latched(block, drive->faulty_commands) | latched(block, drive->faulty_pressures)) &
                                 DZ_STATUS_LATCHED));
-    drive->law = (uint16_t)(dz_comp_checked(past, p_a_adc, p_b_adc, held) & ~gone);
+    drive->law = (uint16_t)(dz_comp_checked(past, dz_pressure_difference(side, p_a_adc, p_b_adc), held) & ~gone);
     if ((block->play_codes != 0u) && (at_rest == 0u)) {
         drive->law = with_play(block, side, drive, away, drive->law);
     }

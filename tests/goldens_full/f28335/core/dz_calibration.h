@@ -24,6 +24,8 @@
 #define DZ_TICK_HZ 2500u
 /* Codes of pressure drop between two nodes of beta: a power of two (exact). */
 #define DZ_BETA_STEP 64u
+/* From weighted codes to codes of the sensor ahead: 1/4096 (exact). */
+#define DZ_WEIGHT_SHIFT 12u
 /* Room for pressure sensors: A, B, C (exact). */
 #define DZ_CALIBRATION_SENSORS 2u
 /* Room for signs of command: positive, negative (exact). */

@@ -11,13 +11,13 @@
  * MISRA C:2012: nothing found by cppcheck 2.10 (--platform=avr8 --std=c99 --addon=misra) in this file.
  */
 
-#include "dz_comp.h"
-
-#include "dz_valve.h"
-
 #if defined(__TI_COMPILER_VERSION__) && !defined(DZ_CORE_IN_FLASH)
 #pragma SET_CODE_SECTION(".TI.ramfunc") /* without wait states; TI's linker files copy it at the start */
 #endif
+
+#include "dz_comp.h"
+
+#include "dz_valve.h"
 
 /* In counts of the PWM the law is sum / (divisor * 2^shift), both of the reciprocal, with the integer of 64 bits
  *     sum = B * (slope * X + offset) + linear * X + half - (B - B_zero) * transition * missing
@@ -27,8 +27,6 @@
  * Nothing is rounded before the one shift and the one division, which is a product with a reciprocal.
  */
 
-/* From weighted codes to codes of the sensor ahead: 1/2^12 (the difference is rounded down). */
-#define WEIGHT_SHIFT 12u
 /* The power of two in DZ_BETA_STEP: 1/64 (exact). */
 #define BETA_STEP_SHIFT 6u
 /* The top bit of a word, set where it stands for a negative number: 2147483648 (exact). */
@@ -37,8 +35,6 @@
 #define LARGEST_SHIFT 31u
 /* Largest shift of 64 bits: 63 (exact). */
 #define LARGEST_WIDE_SHIFT 63u
-/* Place of DZ_STATUS_DIFFERENCE in the status word: bit 3 (a convention). */
-#define DIFFERENCE_PLACE 3u
 
 /* ---- words: a negative number is stored 2^32 higher; masks in place of branches, all ones for yes, 0 for no ---- */
 
@@ -78,24 +74,6 @@ static uint64_t whole(const uint32_t *halves)
 
 /* ---- signals ---- */
 
-/* All ones if the command is outside its valid range: no working signal produces it. */
-static uint32_t invalid_command(const struct dz_calibration *block, uint32_t u)
-{
-    return below_zero((u - block->command_low) | (block->command_high - u));
-}
-
-/* A word whose top bit is set if a code is outside the valid range of its sensor. */
-static uint32_t out_of_range(const struct dz_calibration_sensor *sensor, uint32_t code)
-{
-    return (code - sensor->low) | (sensor->high - code);
-}
-
-/* Difference of a side's pressures, ahead minus behind, in codes of the sensor ahead times 4096. */
-static uint32_t pressure_difference(const struct dz_calibration_side *side, uint32_t ahead, uint32_t behind)
-{
-    return (ahead << WEIGHT_SHIFT) - (behind * side->weight) - side->balance;
-}
-
 /* All ones if the pressures are implausible: one is outside its valid range, or the drop is below -reverse. */
 static uint32_t failed_pressures(const struct dz_calibration *block, uint32_t one_outside, uint32_t difference)
 {
@@ -115,10 +93,10 @@ struct betas
 static inline struct betas betas_at(const struct dz_calibration_side *side, uint32_t difference, uint32_t failed)
 {
     const uint32_t drop = (difference & ~below_zero(difference)) | failed;
-    const uint32_t past = (drop >> WEIGHT_SHIFT) & (DZ_BETA_STEP - 1u);
+    const uint32_t past = (drop >> DZ_WEIGHT_SHIFT) & (DZ_BETA_STEP - 1u);
     const uint32_t left = DZ_BETA_STEP - past;
     const struct dz_calibration_node *node =
-        &side->nodes[(drop >> (WEIGHT_SHIFT + BETA_STEP_SHIFT)) & DZ_CALIBRATION_NODE_MASK];
+        &side->nodes[(drop >> (DZ_WEIGHT_SHIFT + BETA_STEP_SHIFT)) & DZ_CALIBRATION_NODE_MASK];
     struct betas beta;
 
     beta.law = (node[0].law * left) + (node[1].law * past);
@@ -160,23 +138,21 @@ uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
     const struct dz_calibration *block = &dz_valve;
     const struct dz_calibration_side *side = &block->sides[0];
     const uint32_t u = u_adc;
-    const uint32_t let_go = invalid_command(block, u);
+    const uint32_t let_go = dz_invalid_command(block, u);
     const uint32_t from_band = u - side->band_end;
     const uint32_t one_outside =
-        out_of_range(&block->sensors[0], p_a_adc) | out_of_range(&block->sensors[1], p_b_adc);
-    const uint32_t difference = pressure_difference(side, p_a_adc, p_b_adc);
+        dz_out_of_range(&block->sensors[0], p_a_adc) | dz_out_of_range(&block->sensors[1], p_b_adc);
+    const uint32_t difference = dz_pressure_difference(side, p_a_adc, p_b_adc);
     const uint32_t failed = failed_pressures(block, one_outside, difference);
     const struct betas beta = betas_at(side, difference, failed);
 
     return (uint16_t)(counts_of(side, sum_of(block, side, from_band & ~below_zero(from_band), beta)) & ~let_go);
 }
 
-uint32_t dz_comp_checked(uint32_t command, uint16_t p_a_adc,
-                         uint16_t p_b_adc, uint32_t failed)
+uint32_t dz_comp_checked(uint32_t command, uint32_t difference, uint32_t failed)
 {
     const struct dz_calibration *block = &dz_valve;
     const struct dz_calibration_side *side = &block->sides[0];
-    const uint32_t difference = pressure_difference(side, p_a_adc, p_b_adc);
 
     return counts_of(side, sum_of(block, side, command, betas_at(side, difference, failed)));
 }
@@ -184,20 +160,7 @@ uint32_t dz_comp_checked(uint32_t command, uint16_t p_a_adc,
 uint16_t dz_status(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
 {
     const struct dz_calibration *block = &dz_valve;
-    const struct dz_calibration_side *side = &block->sides[0];
-    const uint32_t u = u_adc;
-    /* The top bit is set if a code is outside its valid range, or the difference beyond its limits. */
-    const uint32_t ahead = out_of_range(&block->sensors[0], p_a_adc);
-    const uint32_t behind = out_of_range(&block->sensors[1], p_b_adc);
-    const uint32_t difference = pressure_difference(side, p_a_adc, p_b_adc);
-    const uint32_t below = difference + block->reverse;
-    const uint32_t above = side->tested_to - difference;
-    const uint32_t of_drop = (below >> 31) | ((above >> 31) * (DZ_STATUS_ABOVE >> DIFFERENCE_PLACE));
-
-    /* The difference has no meaning if a pressure is outside its valid range. */
-    return (uint16_t)((invalid_command(block, u) & DZ_STATUS_COMMAND) | ((ahead >> 31) * DZ_STATUS_PRESSURE_A) |
-                      ((behind >> 31) * DZ_STATUS_PRESSURE_B) |
-                      ((of_drop & ~below_zero(ahead | behind)) * DZ_STATUS_DIFFERENCE));
+    return (uint16_t)dz_status_of(block, u_adc, p_a_adc, p_b_adc);
 }
 
 uint16_t dz_beta(uint16_t p_a_adc, uint16_t p_b_adc)
@@ -205,8 +168,8 @@ uint16_t dz_beta(uint16_t p_a_adc, uint16_t p_b_adc)
     const struct dz_calibration *block = &dz_valve;
     const struct dz_calibration_side *side = &block->sides[0];
     const uint32_t one_outside =
-        out_of_range(&block->sensors[0], p_a_adc) | out_of_range(&block->sensors[1], p_b_adc);
-    const uint32_t difference = pressure_difference(side, p_a_adc, p_b_adc);
+        dz_out_of_range(&block->sensors[0], p_a_adc) | dz_out_of_range(&block->sensors[1], p_b_adc);
+    const uint32_t difference = dz_pressure_difference(side, p_a_adc, p_b_adc);
     const uint32_t failed = failed_pressures(block, one_outside, difference);
 
     return (uint16_t)(((uint64_t)betas_at(side, difference, failed).law * side->beta_factor) >>
@@ -220,23 +183,21 @@ uint16_t dz_comp_negative(uint16_t u_adc, uint16_t p_b_adc, uint16_t p_a_adc)
     const struct dz_calibration *block = &dz_valve;
     const struct dz_calibration_side *side = &block->sides[1];
     const uint32_t u = u_adc;
-    const uint32_t let_go = invalid_command(block, u);
+    const uint32_t let_go = dz_invalid_command(block, u);
     const uint32_t from_band = side->band_end - u;
     const uint32_t one_outside =
-        out_of_range(&block->sensors[1], p_b_adc) | out_of_range(&block->sensors[0], p_a_adc);
-    const uint32_t difference = pressure_difference(side, p_b_adc, p_a_adc);
+        dz_out_of_range(&block->sensors[1], p_b_adc) | dz_out_of_range(&block->sensors[0], p_a_adc);
+    const uint32_t difference = dz_pressure_difference(side, p_b_adc, p_a_adc);
     const uint32_t failed = failed_pressures(block, one_outside, difference);
     const struct betas beta = betas_at(side, difference, failed);
 
     return (uint16_t)(counts_of(side, sum_of(block, side, from_band & ~below_zero(from_band), beta)) & ~let_go);
 }
 
-uint32_t dz_comp_checked_negative(uint32_t command, uint16_t p_b_adc,
-                                  uint16_t p_a_adc, uint32_t failed)
+uint32_t dz_comp_checked_negative(uint32_t command, uint32_t difference, uint32_t failed)
 {
     const struct dz_calibration *block = &dz_valve;
     const struct dz_calibration_side *side = &block->sides[1];
-    const uint32_t difference = pressure_difference(side, p_b_adc, p_a_adc);
 
     return counts_of(side, sum_of(block, side, command, betas_at(side, difference, failed)));
 }
@@ -244,20 +205,7 @@ uint32_t dz_comp_checked_negative(uint32_t command, uint16_t p_b_adc,
 uint16_t dz_status_negative(uint16_t u_adc, uint16_t p_b_adc, uint16_t p_a_adc)
 {
     const struct dz_calibration *block = &dz_valve;
-    const struct dz_calibration_side *side = &block->sides[1];
-    const uint32_t u = u_adc;
-    /* The top bit is set if a code is outside its valid range, or the difference beyond its limits. */
-    const uint32_t ahead = out_of_range(&block->sensors[1], p_b_adc);
-    const uint32_t behind = out_of_range(&block->sensors[0], p_a_adc);
-    const uint32_t difference = pressure_difference(side, p_b_adc, p_a_adc);
-    const uint32_t below = difference + block->reverse;
-    const uint32_t above = side->tested_to - difference;
-    const uint32_t of_drop = (below >> 31) | ((above >> 31) * (DZ_STATUS_ABOVE >> DIFFERENCE_PLACE));
-
-    /* The difference has no meaning if a pressure is outside its valid range. */
-    return (uint16_t)((invalid_command(block, u) & DZ_STATUS_COMMAND) | ((ahead >> 31) * DZ_STATUS_PRESSURE_B) |
-                      ((behind >> 31) * DZ_STATUS_PRESSURE_A) |
-                      ((of_drop & ~below_zero(ahead | behind)) * DZ_STATUS_DIFFERENCE));
+    return (uint16_t)dz_status_of_negative(block, u_adc, p_b_adc, p_a_adc);
 }
 
 uint16_t dz_beta_negative(uint16_t p_b_adc, uint16_t p_a_adc)
@@ -265,8 +213,8 @@ uint16_t dz_beta_negative(uint16_t p_b_adc, uint16_t p_a_adc)
     const struct dz_calibration *block = &dz_valve;
     const struct dz_calibration_side *side = &block->sides[1];
     const uint32_t one_outside =
-        out_of_range(&block->sensors[1], p_b_adc) | out_of_range(&block->sensors[0], p_a_adc);
-    const uint32_t difference = pressure_difference(side, p_b_adc, p_a_adc);
+        dz_out_of_range(&block->sensors[1], p_b_adc) | dz_out_of_range(&block->sensors[0], p_a_adc);
+    const uint32_t difference = dz_pressure_difference(side, p_b_adc, p_a_adc);
     const uint32_t failed = failed_pressures(block, one_outside, difference);
 
     return (uint16_t)(((uint64_t)betas_at(side, difference, failed).law * side->beta_factor) >>

@@ -53,13 +53,6 @@ uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
 /* The same for negative commands, with the thresholds of that side. The pressure drop is B minus A. */
 uint16_t dz_comp_negative(uint16_t u_adc, uint16_t p_b_adc, uint16_t p_a_adc);
 
-/* For dz_drive.c, which checks the inputs itself: the law for a command in codes past the zero band, 0
- * below; `failed` is all ones for pressures that must not be used, else 0. */
-uint32_t dz_comp_checked(uint32_t command, uint16_t p_a_adc, uint16_t p_b_adc,
-                         uint32_t failed);
-uint32_t dz_comp_checked_negative(uint32_t command, uint16_t p_b_adc,
-                                  uint16_t p_a_adc, uint32_t failed);
-
 /* Returns the status of the inputs, an OR of DZ_STATUS_...; 0: all are valid, no pressure drop is above the tests. */
 uint16_t dz_status(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
 
@@ -69,6 +62,69 @@ uint16_t dz_status_negative(uint16_t u_adc, uint16_t p_b_adc, uint16_t p_a_adc);
 /* Returns the beta that dz_comp() uses at these pressures, times 2^15, rounded down: for a display, not for control. */
 uint16_t dz_beta(uint16_t p_a_adc, uint16_t p_b_adc);
 uint16_t dz_beta_negative(uint16_t p_b_adc, uint16_t p_a_adc);
+
+/* ---- for dz_drive.c; inline, because a call takes longer than what these do ---- */
+
+/* All ones if the command is outside its valid range: no working signal produces it. */
+static inline uint32_t dz_invalid_command(const struct dz_calibration *block, uint32_t u)
+{
+    return 0u - (((u - block->command_low) | (block->command_high - u)) >> 31);
+}
+
+/* A word whose top bit is set if a code is outside the valid range of its sensor. */
+static inline uint32_t dz_out_of_range(const struct dz_calibration_sensor *sensor, uint32_t code)
+{
+    return (code - sensor->low) | (sensor->high - code);
+}
+
+/* Difference of a side's pressures, ahead minus behind, in codes of the sensor ahead times 4096. */
+static inline uint32_t dz_pressure_difference(const struct dz_calibration_side *side, uint32_t ahead, uint32_t behind)
+{
+    return (ahead << DZ_WEIGHT_SHIFT) - (behind * side->weight) - side->balance;
+}
+
+/* What dz_status() returns. */
+static inline uint32_t dz_status_of(
+    const struct dz_calibration *block, uint32_t u, uint32_t p_a_adc, uint32_t p_b_adc)
+{
+    const struct dz_calibration_side *side = &block->sides[0];
+    /* The top bit is set if a code is outside its valid range, or the difference beyond its limits. */
+    const uint32_t ahead = dz_out_of_range(&block->sensors[0], p_a_adc);
+    const uint32_t behind = dz_out_of_range(&block->sensors[1], p_b_adc);
+    const uint32_t difference = dz_pressure_difference(side, p_a_adc, p_b_adc);
+    const uint32_t below = difference + block->reverse;
+    const uint32_t above = side->tested_to - difference;
+    const uint32_t of_drop = (below >> 31) | ((above >> 31) * (DZ_STATUS_ABOVE / DZ_STATUS_DIFFERENCE));
+
+    /* The difference has no meaning if a pressure is outside its valid range. */
+    return (dz_invalid_command(block, u) & DZ_STATUS_COMMAND) | ((ahead >> 31) * DZ_STATUS_PRESSURE_A) |
+           ((behind >> 31) * DZ_STATUS_PRESSURE_B) |
+           ((of_drop & (0u - (~(ahead | behind) >> 31))) * DZ_STATUS_DIFFERENCE);
+}
+
+/* What dz_status_negative() returns. */
+static inline uint32_t dz_status_of_negative(
+    const struct dz_calibration *block, uint32_t u, uint32_t p_b_adc, uint32_t p_a_adc)
+{
+    const struct dz_calibration_side *side = &block->sides[1];
+    /* The top bit is set if a code is outside its valid range, or the difference beyond its limits. */
+    const uint32_t ahead = dz_out_of_range(&block->sensors[1], p_b_adc);
+    const uint32_t behind = dz_out_of_range(&block->sensors[0], p_a_adc);
+    const uint32_t difference = dz_pressure_difference(side, p_b_adc, p_a_adc);
+    const uint32_t below = difference + block->reverse;
+    const uint32_t above = side->tested_to - difference;
+    const uint32_t of_drop = (below >> 31) | ((above >> 31) * (DZ_STATUS_ABOVE / DZ_STATUS_DIFFERENCE));
+
+    /* The difference has no meaning if a pressure is outside its valid range. */
+    return (dz_invalid_command(block, u) & DZ_STATUS_COMMAND) | ((ahead >> 31) * DZ_STATUS_PRESSURE_B) |
+           ((behind >> 31) * DZ_STATUS_PRESSURE_A) |
+           ((of_drop & (0u - (~(ahead | behind) >> 31))) * DZ_STATUS_DIFFERENCE);
+}
+
+/* The law without these checks, for a command in codes past the zero band, 0 below; `failed` is all ones for pressures
+ * that must not be used, else 0. */
+uint32_t dz_comp_checked(uint32_t command, uint32_t difference, uint32_t failed);
+uint32_t dz_comp_checked_negative(uint32_t command, uint32_t difference, uint32_t failed);
 
 #ifdef __cplusplus
 }

@@ -8,13 +8,13 @@
  * MISRA C:2012: nothing found by cppcheck 2.10 (--platform=avr8 --std=c99 --addon=misra) in this file.
  */
 
-#include "dz_drive.h"
-
-#include "dz_valve.h"
-
 #if defined(__TI_COMPILER_VERSION__) && !defined(DZ_CORE_IN_FLASH)
 #pragma SET_CODE_SECTION(".TI.ramfunc") /* without wait states; TI's linker files copy it at the start */
 #endif
+
+#include "dz_drive.h"
+
+#include "dz_valve.h"
 
 /* Unit of the ramped command, a code of command: 65536 (exact). */
 #define RAMP_UNIT UINT32_C(65536)
@@ -238,7 +238,7 @@ void dz_drive_sample(struct dz_drive *drive, uint16_t u_adc, uint16_t p_a_adc,
                      uint16_t p_b_adc)
 {
     const struct dz_calibration *block = &dz_valve;
-    const uint32_t sensed = dz_status(u_adc, p_a_adc, p_b_adc);
+    const uint32_t sensed = dz_status_of(block, u_adc, p_a_adc, p_b_adc);
     const int32_t asked = (int32_t)u_adc - (int32_t)block->command_zero;
     const uint32_t gone = no_command(block, drive, all_ones(sensed & DZ_STATUS_COMMAND), asked);
     const int32_t command = command_of(block, drive, asked, gone);
@@ -269,7 +269,7 @@ void dz_drive_sample(struct dz_drive *drive, uint16_t u_adc, uint16_t p_a_adc,
         reset_play(block, drive);
     }
     if (drive->side < 0) {
-        status = dz_status_negative(u_adc, p_b_adc, p_a_adc);
+        status = dz_status_of_negative(block, u_adc, p_b_adc, p_a_adc);
     }
     held = held_pressures(block, &drive->valid_pressures, &drive->faulty_pressures,
                           status & (DZ_STATUS_PRESSURE_A | DZ_STATUS_PRESSURE_B | DZ_STATUS_DIFFERENCE));
@@ -277,9 +277,11 @@ void dz_drive_sample(struct dz_drive *drive, uint16_t u_adc, uint16_t p_a_adc,
                                ((latched(block, drive->faulty_commands) | latched(block, drive->faulty_pressures)) &
                                 DZ_STATUS_LATCHED));
     if (drive->side > 0) {
-        drive->law = (uint16_t)dz_comp_checked(past, p_a_adc, p_b_adc, held);
+        drive->law = (uint16_t)dz_comp_checked(
+            past, dz_pressure_difference(&block->sides[0], p_a_adc, p_b_adc), held);
     } else if (drive->side < 0) {
-        drive->law = (uint16_t)dz_comp_checked_negative(past, p_b_adc, p_a_adc, held);
+        drive->law = (uint16_t)dz_comp_checked_negative(
+            past, dz_pressure_difference(&block->sides[1], p_b_adc, p_a_adc), held);
     } else {
         drive->law = 0u;
     }
