@@ -16,6 +16,7 @@ from dzdesign.design.designing import design
 from dzdesign.design.drive_functions import DriveFunctions
 from dzdesign.design.signals import CommandSignal, Signals
 from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.valve.recorded_curve import RecordedBranch, RecordedCurve
 from dzdesign.regeneration import regenerated
 from dzdesign.verify.closed_loop.loop import RampSequence
 from dzdesign.verify.verification import Asked, verify
@@ -112,9 +113,37 @@ def test_a_law_that_would_fall_with_command_is_refused():
     """Below dP0 of 3 MPa beta is 1.5, and a valve whose stroke takes next to no command leaves no gain there."""
     tests = [synthetic_ramp(dp, Truth(knee_rising=6.5 - 1.0 * dp, slope=4 * dp**0.5)) for dp in (0.5, 1.0, 3.0)]
     valve = identify(tests, IdentifyOptions(dp0=3e6))
-    side = dataclasses.replace(valve.positive, k_x_max_over_u_max=2e-3)
+    jump = RecordedBranch(u_V=(3.4, 3.5), q_L_min=(0.0, 9.0), u_seen_V=3.4, error_L_min=0.0)
+    recorded = RecordedCurve(rising=jump, falling=None, dp_at_flow_MPa=None)
+    jumping = tuple(dataclasses.replace(test, recorded=recorded) for test in valve.positive.tests)
+    side = dataclasses.replace(valve.positive, k_x_max_over_u_max=2e-3, tests=jumping)
     with pytest.raises(InputError, match="would fall with rising command"):
         designed_for(dataclasses.replace(valve, sides={"positive": side}), below_dp0="extend")
+
+
+@pytest.mark.parametrize("bend", [0.87, 0.95])
+def test_a_curved_flow_is_driven_to_its_end(bend):
+    """A flow that bends away from its line, without a stop, ends below k x_max."""
+
+    def bent(test):
+        branch = test.recorded.rising
+        knee, full = test.u_knee_rising_V, branch.u_V[-1]
+        share = [min(max((u - knee) / (full - knee), 0.0), 1.0) for u in branch.u_V]
+        flows = tuple(q * (1 - (1 - bend) * part) for q, part in zip(branch.q_L_min, share, strict=True))
+        curve = dataclasses.replace(test.recorded, rising=dataclasses.replace(branch, q_L_min=flows))
+        return dataclasses.replace(test, recorded=curve)
+
+    tests = [synthetic_ramp(dp, Truth(knee_rising=5.5 - 0.05 * dp, slope=4 * dp**0.5)) for dp in (1.0, 3.0, 5.0)]
+    valve = identify(tests, IdentifyOptions())
+    side = valve.positive
+    curved = dataclasses.replace(
+        side, k_x_max_over_u_max=bend * side.k_x_max_over_u_max, tests=tuple(map(bent, side.tests))
+    )
+    compensator = designed_for(dataclasses.replace(valve, sides={"positive": curved}))
+    for test in curved.tests:
+        full = float(compensator.drive(compensator.signals.code_max, compensator.signals.pair(1).code_at(test.dp_MPa)))
+        flow = test.recorded.rising.flow_at(10 * full)
+        assert flow >= 0.975 * max(test.recorded.rising.q_L_min)
 
 
 def test_loss_against_the_certified_curve_is_small(example_valve, example_compensator):

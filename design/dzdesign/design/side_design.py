@@ -24,6 +24,8 @@ from dzdesign.identify.valve.side_model import SideModel
 #: than half a count of a PWM of 60 000.
 BETA_BITS = (15, 11)
 COEFFICIENT_BITS = (16, 12)
+#: Share of each test's largest flow that full command has to reach.
+FULL_FLOW = 0.98
 #: What either factor of the firmware's product may take: 31 bits.
 FACTOR_LIMIT = 2**31
 
@@ -238,12 +240,16 @@ def travel(side: SideModel, u_max: Fraction, offset_V: Fraction) -> Fraction:
     """Return k x_max/u_max for a law whose offset is u_min0: from there to the command of full flow on opening.
 
     Identification gives k x_max from the knee on. The law starts lower, at the guarded offset; without the difference
-    full command would not reach full flow (u_O(u_max) = u_max exactly if k x_max = u_max - u_min0).
+    full command would not reach full flow (u_O(u_max) = u_max exactly if k x_max = u_max - u_min0). Nor would it where
+    the flow bends before its end, or the stop is met at some pressure drops only: the recorded flow says how far to go.
     """
     reference = min(side.tests, key=lambda test: abs((test.dp_MPa or 0.0) - (side.reference.dp_MPa or 0.0)))
     knee = reference.u_knee_rising_V if reference.u_knee_rising_V is not None else reference.u_knee_falling_V
     below_knee = max(Fraction(repr(knee)) - offset_V, Fraction(0))
     travel = Fraction(repr(side.k_x_max_over_u_max)) + below_knee / u_max
+    recorded = (test.recorded.opening for test in side.tests)
+    flows_V = max(branch.command_at(FULL_FLOW * max(branch.q_L_min)) or 0.0 for branch in recorded)
+    travel = max(travel, (Fraction(repr(round(flows_V, 7))) - offset_V) / u_max)
     return min(travel, 1 - offset_V / u_max)  # beyond full drive there is nothing
 
 
