@@ -44,7 +44,9 @@ def current_request(
     """Return what is declared for current control; None for a drive by duty. Options come as texts and as read."""
     if text["drive"] == "duty":
         if useless := [flag_of(name) for name in OF_CURRENT if text[name]]:
-            raise InputError(f"{useless[0]} is for --drive current, but --drive is duty; give --drive current")
+            raise InputError(
+                f"{useless[0]} is for --drive current, but --drive is duty; take it out, or give --drive current"
+            )
         return None
     if target.current_sampling is None:
         raise InputError(f"the files of target {target.name} sample no current; give --drive duty, or another --target")

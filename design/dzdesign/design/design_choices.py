@@ -194,7 +194,7 @@ class DesignChoices:
 
     drive: Annotated[Text, Option("D", DRIVE, "duty", choices=DRIVES)] = None
     """Output of the law. duty: the PWM's share of the supply voltage. current: the set point of a current loop in the
-    firmware, for one solenoid, with the rated current as full drive."""
+    firmware, for one solenoid or two, with the rated current as full drive."""
     coil: Annotated[Text, Option("C", DRIVE, example="3.5 ohm 40 mH", read=_coil)] = None
     """Coil for --drive current, such as "3.5 ohm 40 mH". The form "3.5 + 0.5 ohm x 0.75..1.35, 40 mH x 0.5..1.5" adds
     the resistance of switch and shunt and the ranges, here with their defaults."""

@@ -13,6 +13,7 @@ from pathlib import Path
 from pkgutil import resolve_name
 from typing import Any
 
+from dzdesign.core.display import verdict_words
 from dzdesign.core.errors import RequirementError, one_line
 from dzdesign.terminal.page import print_json, say_results
 
@@ -108,6 +109,10 @@ def _after_run(made: Any, arguments: Any) -> Iterator[str]:
     if made.warnings:
         codes = (code + (f" ({count})" if count > 1 else "") for code, count in made.warnings.items())
         yield f"warnings about the recordings: {', '.join(codes)}"
+    yield from (f"warning: {each}" for each in made.notes)
+    for check in made.evidence.checks:
+        if check.holds is not True:
+            yield f"{verdict_words(check.holds)}  {check.name}: {check.text}"
     yield made.verdict
     yield f"Open first: {made.report}"
 

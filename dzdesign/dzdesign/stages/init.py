@@ -3,6 +3,7 @@
 import json
 import math
 import os
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
 from pathlib import Path
@@ -255,8 +256,11 @@ def _summary(
         where = f"{pressures} {units.label('MPa')}" if pressures else "an unknown pressure drop"
         flow = units.text(max(test.q_max_L_min for test in side.tests), ".3g L/min")
         yield f"{name} commands: {ramps} ramp{'s' if ramps > 1 else ''} at {where}, up to {flow}"
-    for warning in valve.warnings if valve else ():
-        yield f"warning [{warning.code}] {f'{warning.source}: ' if warning.source else ''}{warning.text}"
+    warnings = valve.warnings if valve else ()
+    counts = Counter(warning.code for warning in warnings)
+    for warning in {each.code: each for each in reversed(warnings)}.values():  # the first of each code
+        times = f" ({counts[warning.code]})" if counts[warning.code] > 1 else ""
+        yield f"warning [{warning.code}]{times} {f'{warning.source}: ' if warning.source else ''}{warning.text}"
 
 
 def _rendered(**content: object) -> str:

@@ -64,8 +64,9 @@ class Run:
 
     stages: tuple[StageRun, ...]
     evidence: "Evidence | OutputEvidence"
-    #: Code and count of each warning of `identify`.
+    #: Code and count of each warning of `identify`; and what `design` warns of, in words.
     warnings: dict[str, int]
+    notes: tuple[str, ...]
     #: On the firmware or other output, in words.
     verdict: str
     #: What to open first.
@@ -100,6 +101,8 @@ def run(arguments: RunArguments) -> Run:
     from dzdesign.codegen.project import DEFAULT_TARGET
     from dzdesign.core.artefact_reading import read_artefact
     from dzdesign.design.compensator import Compensator
+    from dzdesign.design.costs import design_warnings
+    from dzdesign.design.pressure_inputs import not_covered
     from dzdesign.identify.valve.model import ValveModel
     from dzdesign.report.valve_report import REPORT_NAME
     from dzdesign.verify.evidence import Evidence, OutputEvidence
@@ -129,14 +132,15 @@ def run(arguments: RunArguments) -> Run:
     read = read_artefact(read_bytes(Path(evidence) / name, "evidence"), (Evidence, OutputEvidence), name)
     found = cast("Evidence | OutputEvidence", read)
     warnings = read_artefact(read_bytes(Path(valve), "valve file"), ValveModel, valve).warnings
+    designed = read_artefact(read_bytes(Path(compensator), "compensator file"), Compensator, compensator)
     codes, verdict = [each.code for each in warnings], found.verdict
     if isinstance(found, Evidence) and found.holds:
-        designed = read_artefact(read_bytes(Path(compensator), "compensator file"), Compensator, compensator)
         parts = [verdict.removesuffix("."), f"the certificate covers {designed.certified_of}", found.reservation]
         verdict = "; ".join(filter(None, parts)) + "."
     return Run(
         stages=stages, evidence=found, warnings={code: codes.count(code) for code in dict.fromkeys(codes)},
-        verdict=verdict, report=Path(evidence) / (name if target in OTHER_TARGETS else REPORT_NAME),
+        notes=(*not_covered(designed), *design_warnings(designed)), verdict=verdict,
+        report=Path(evidence) / (name if target in OTHER_TARGETS else REPORT_NAME),
     )  # fmt: skip
 
 
@@ -176,10 +180,10 @@ class _Record:
 
 
 def _hashes(paths: Sequence[AnyPath]) -> Iterator[str]:
-    """Yield the hash of each file, of all that match a pattern, and of all in a folder."""
+    """Yield the hash of each file, of all that match a pattern, and of all in a folder but a report."""
     for path in paths:
         if Path(path).is_dir():
-            for file in sorted(each for each in Path(path).rglob("*") if each.is_file()):
+            for file in sorted(each for each in Path(path).rglob("*") if each.is_file() and each.suffix != ".html"):
                 yield f"{file.relative_to(path).as_posix()} {sha256_of(file.read_bytes())}"
         elif Path(path).exists() or "*" in os.fspath(path) or "?" in os.fspath(path):
             for file in expand([path]):
