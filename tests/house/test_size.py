@@ -15,14 +15,14 @@ ROOM_SIZES = {
     "derivation": (4704, 28, 326),
     "identify": (16184, 93, 1052),
     "assess": (1577, 8, 0),
-    "design": (7224, 31, 0),
-    "codegen": (7798, 50, 7921),
-    "verify": (12027, 63, 4630),
+    "design": (7232, 31, 0),
+    "codegen": (7786, 50, 7929),
+    "verify": (12029, 63, 4630),
     "report": (4403, 20, 517),
-    "dzdesign": (9193, 62, 173),
+    "dzdesign": (9206, 62, 173),
 }
 #: Lines of Python of what is not shipped, and of the files that the tests compare with.
-TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 46260, 14562, 8554
+TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 46289, 14570, 8554
 #: Options of all commands together; an option of two commands counts twice.
 OPTIONS = 171
 #: What a number may be above what is there, before it is to be lowered.
