@@ -1,4 +1,4 @@
-"""The premises of the scatter from ramp to ramp: independent, no copies, one population; and what they are for."""
+"""The premises of the scatter from ramp to ramp: independent, one population; and what they are for."""
 
 from dataclasses import replace
 
@@ -9,7 +9,7 @@ from scipy.stats import binom
 from dzdesign.identify.fit import scatter
 from dzdesign.identify.fit.certificate import certify
 from dzdesign.identify.fit.curve_class import find_class
-from dzdesign.identify.fit.ramp_model import Ramps, fit_ramp_model
+from dzdesign.identify.fit.ramp_model import Ramps
 from dzdesign.identify.identification import identify
 from dzdesign.identify.knees import between_ramps
 from dzdesign.identify.knees.between_ramps import RampKnees, compare_ramps
@@ -34,7 +34,7 @@ def compared(knees, order, *, dated=True, noise=NOISE_SE):
     number = np.array([np.sum(order[:at] == one) for at, one in enumerate(order)])
     when = np.arange(order.size, dtype=float) if dated else np.full(order.size, np.nan)
     known = RampKnees(
-        test=order, number=number, knee=knees, se=np.full(order.size, noise), when=when, least=0.0 * knees,
+        test=order, number=number, knee=knees, se=np.full(order.size, noise), when=when,
         switched=[{}] * order.size, source=("",) * order.size,
     )  # fmt: skip
     return compare_ramps(known, 1.0 + np.arange(TESTS), np.bincount(order).tolist(), IdentifyOptions())
@@ -119,66 +119,6 @@ class TestOutlyingRamp:
         taken = series(self.ORDER, scatter=0.003, seed=14)
         taken.tests[4] = moved(taken.tests[4], 0.08)
         assert not self.warned(taken.tests)
-
-
-class TestAlikeRepeats:
-    """Repeats that were made from one another, and benches on which true repeats are nearly the same."""
-
-    ORDER = shuffled(17)
-
-    @staticmethod
-    def means(test, count=2):
-        """Return a recording that another logger, or a script, made of this one: means of so many rows."""
-        whole = test.u.size // count * count
-        averaged = {
-            name: getattr(test, name)[:whole].reshape(-1, count).mean(axis=1) for name in ("time", "u", "q", "dp")
-        }
-        return replace(test, **averaged)
-
-    def copies(self):
-        """Return one recording at each pressure drop, and two that were made from it."""
-        first = series(tuple(range(len(PRESSURES))), scatter=0.02, seed=17, dated=False).tests
-        made = [(test, self.means(test), self.means(test, 3)) for test in first]
-        every = [each for group in made for each in group]
-        return [replace(test, source=f"ramp{place}.csv", sha256=f"{place:064d}") for place, test in enumerate(every)]
-
-    def test_copies_with_other_samples_are_said(self, wording):
-        (warning,) = warned(self.copies(), "alike-repeats")
-        wording("between ramps: alike", warning.text)
-        assert warning.source.startswith("ramp")
-
-    def test_the_check_that_is_off_is_seen(self, monkeypatch):
-        monkeypatch.setattr(between_ramps, "AS_ALIKE", 0.0)
-        assert not warned(self.copies(), "alike-repeats")
-
-    @pytest.mark.parametrize("repeats", [2, 3, 6])
-    def test_true_repeats_are_as_alike_once_in_a_thousand_series(self, repeats):
-        """The valve itself scatters not at all: nothing but the noise, of another size at each pressure drop."""
-        rng, count, found_alike = np.random.default_rng(repeats), 5000, 0
-        order = np.repeat(np.arange(TESTS), repeats)
-        least = np.array([8e-3, 3e-3, 1e-3, 0.5e-3])[order] ** 2
-        ramps = Ramps(dp_MPa=1.0 + order, y=np.zeros(order.size), se=np.sqrt(least))
-        model = fit_ramp_model(ramps, share_knots=False)
-        for _ in range(count):
-            knees = np.sqrt(least) * rng.standard_normal(order.size)
-            of_series = replace(model, ramps=replace(ramps, y=knees))
-            found_alike += between_ramps.find_alike_repeats(of_series, order, least) is not None
-        assert found_alike <= binom.isf(1e-4, count, between_ramps.AS_ALIKE)
-
-    @pytest.mark.parametrize(
-        ("noise", "step", "ripple"),
-        [(0.0, 0.0147, 0.0), (0.0, 0.1, 0.0), (0.03, 0.06, 0.0), (0.1, 0.05, 0.0), (0.05, 0.0, 0.5), (0.0, 0.0, 0.0)],
-        ids=["no noise, 12 bits", "no noise, coarse", "half a step", "two steps", "a pump's ripple", "no noise at all"],
-    )
-    def test_repeats_of_a_quiet_bench_are_not_said(self, noise, step, ripple):
-        rng, tests = np.random.default_rng(18), []
-        for place, dp in enumerate(PRESSURES * 3):
-            truth = Truth(knee_rising=5.4 + 2e-4 * rng.standard_normal(), slope=4 * dp**0.5, noise=noise)
-            test = synthetic_ramp(dp, truth, seed=place, rate_Hz=20.0, ramp_s=20.0)
-            q = test.q + ripple * L_MIN * np.sin(2 * np.pi * (9.0 * test.time + rng.uniform()))
-            q = np.round(q / L_MIN / step) * step * L_MIN if step else q
-            tests.append(replace(test, q=q, source=f"ramp{place}.csv", sha256=f"{place:064d}"))
-        assert not warned(tests, "alike-repeats")
 
 
 class TestSerialScatter:

@@ -232,7 +232,7 @@ def _about_scatter(
     u_max: float,
 ) -> Iterator[Warning_]:
     """Yield what the repeats say against a scatter that is normal, alike at all pressure drops, and independent."""
-    alike, groups, unlike = checks.alike, checks.groups, scatter.unlike
+    groups, unlike = checks.groups, scatter.unlike
     if groups and groups.apart > SMALLEST_DISTANCE * u_max:
         low, high = (tests[test].ramps[number] for test, number in groups.ramps)
         yield warn(
@@ -243,15 +243,6 @@ def _about_scatter(
             column=groups.column,
             low=groups.values[0] or low,
             high=groups.values[1] or high,
-        )
-    if alike:
-        where = "at all pressure drops together, and most of all here," if alike.everywhere else "here"
-        yield warn(
-            "alike-repeats",
-            tests[alike.test].test.source,
-            where=where,
-            sd_mV=1e3 * alike.sd,
-            noise_mV=1e3 * alike.of_noise,
         )
     if unlike:
         knot_MPa = scatter.model.knots_MPa[unlike.knot]

@@ -3,7 +3,7 @@
 The noise of one ramp says how well that ramp's knee is known, and nothing of where the valve closes the next time. The
 knees of the single ramps obey the model of `fit.ramp_model`; `fit.scatter` measures their scatter. Here the ramps are
 brought to the state in the middle of the series, so that those pooled to one test lie on one line, and held against the
-premises of that model: independent, no copies, of one population. Each check is exact, or nearly so, for few repeats of
+premises of that model: independent, of one population. Each check is exact, or nearly so, for few repeats of
 a normal scatter, and none of them sees everything.
 """
 
@@ -17,15 +17,12 @@ from dzdesign.identify.constants import REFUSED
 from dzdesign.identify.fit.ramp_model import RampModel, Ramps, fit_ramp_model
 from dzdesign.identify.fit.scatter import Scatter, measure_scatter
 from dzdesign.identify.knees.gated_line import BranchShape, straight_line
-from dzdesign.identify.knees.noise import least_noise, least_step
 from dzdesign.identify.options import IdentifyOptions
 
 #: A ramp tells its own knee with at least so many samples, over this share of the straight part.
 RAMP_SAMPLES, RAMP_SPAN = 5, 0.5
 #: Decimals of valve.json: the ramps are rounded before they are fitted, so that a reader finds the same bound.
 DECIMALS = 7
-#: Probability with which true repeats are as alike as copies are.
-AS_ALIKE = 1e-3
 #: Fewest degrees of freedom in which neighbouring ramps can be told to be alike.
 FEWEST_IN_A_ROW = 4
 #: Probability of two groups of ramps below which they are no chance, and the fewest ramps of a test that is parted.
@@ -46,23 +43,9 @@ class RampKnees:
     se: np.ndarray
     #: When it was recorded, s on a clock common to all; NaN where that is not known.
     when: np.ndarray
-    #: Variance that the noise gives each knee at least, V²; 0 where it is not known.
-    least: np.ndarray
     #: What the recording's columns of two values say of each, and its name.
     switched: Sequence[Mapping[str, str]]
     source: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class AlikeRepeats:
-    """Repeats that scatter less than the meter's noise makes possible: copies, or one recording twice."""
-
-    #: Test whose repeats are the most alike, from 0, and whether it is that one or all tests together.
-    test: int
-    everywhere: bool
-    #: Standard deviation of the knees, V, and what the noise alone gives them at least.
-    sd: float
-    of_noise: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +67,6 @@ class ScatterChecks:
 
     #: Correlation of neighbouring ramps.
     serial: float | None = None
-    alike: AlikeRepeats | None = None
     groups: TwoGroups | None = None
 
 
@@ -127,7 +109,7 @@ def knees_of_ramps(
     rows, marks, sources = list[tuple[float, ...]](), list[Mapping[str, str]](), list[str]()
     for test, (shape, times) in enumerate(zip(shapes, when, strict=True)):
         branch, seen, told = shape.prepared.branch, shape.line.kept & ~shape.line.censored, len(rows)
-        width, step = float(np.ptp(branch.u[seen])), least_step(branch.q)
+        width = float(np.ptp(branch.u[seen]))
         for number, part in enumerate(branch.ramps):
             u, y = branch.u[part][seen[part]], shape.prepared.y[part][seen[part]]
             if u.size < RAMP_SAMPLES or np.ptp(u) < RAMP_SPAN * width:
@@ -137,18 +119,17 @@ def knees_of_ramps(
                 continue
             lever = 1 / u.size + (u.mean() - knee) ** 2 / float(np.sum((u - u.mean()) ** 2))
             se = shape.sigma / slope * math.sqrt(lever * shape.variance_inflation)
-            at_least = least_noise(branch.q[part][seen[part]], step) / slope**2 * lever
-            rows.append((test, number, knee, se, times[number], at_least))
+            rows.append((test, number, knee, se, times[number]))
             marks.append(switched[test][number])
             sources.append(names[test][number])
         if len(rows) == told:
-            rows.append((test, -1, shape.knee, shape.line.knee_se, math.nan, 0.0))
+            rows.append((test, -1, shape.knee, shape.line.knee_se, math.nan))
             marks.append({})
             sources.append(shape.prepared.source)
-    columns = np.array(rows).reshape(-1, 6).T
+    columns = np.array(rows).reshape(-1, 5).T
     test_of, numbers = columns[:2].astype(int)
     return RampKnees(
-        test=test_of, number=numbers, knee=columns[2], se=columns[3], when=columns[4], least=columns[5],
+        test=test_of, number=numbers, knee=columns[2], se=columns[3], when=columns[4],
         switched=marks, source=tuple(sources),
     )  # fmt: skip
 
@@ -174,7 +155,6 @@ def compare_ramps(
         marks = [mark for mark, tells in zip(known.switched, told, strict=True) if tells]
         checks = ScatterChecks(
             serial=find_serial_correlation(model, known.when[told]),
-            alike=find_alike_repeats(model, test, known.least[told]),
             groups=find_two_groups(known.knee[told], test, number, known.se[told] ** 2, marks),
         )
     return BetweenRamps(
@@ -199,33 +179,6 @@ def _shifts(model: RampModel, test: np.ndarray) -> np.ndarray:
 
 
 # ------------------------------------------------------------------------------------------- the premises of the model
-def find_alike_repeats(model: RampModel, test: np.ndarray, least: np.ndarray) -> AlikeRepeats | None:
-    """Return repeats whose residuals are smaller than their noise makes likely, at one pressure drop or at all of them.
-
-    Whatever the valve does, the knees of true repeats scatter by their noise at least (R,): the sum of squares over it
-    has at least a chi-squared distribution. Of true repeats one series in 1 / `AS_ALIKE` is found, Bonferroni over the
-    pressure drops and all together. Where the noise of a ramp is not known nothing is said.
-    """
-    from scipy.special import gammainc
-
-    residual, free = model.projector @ model.ramps.y, np.diag(model.projector)
-    if free.sum() <= NO_DEGREES or not (least > 0).all():
-        return None
-    groups = [np.flatnonzero(test == one) for one in np.unique(test)]
-    groups = [group for group in groups if free[group].sum() > 1 - NO_DEGREES]
-    found = []
-    for group in [*groups, np.arange(test.size)]:
-        degrees = float(free[group].sum())
-        chance = float(gammainc(degrees / 2, float(np.sum(residual[group] ** 2 / least[group])) / 2))
-        sd = math.sqrt(float(residual[group] @ residual[group]) / degrees)
-        found.append((chance * (len(groups) + 1), sd, math.sqrt(float(least[group].mean()))))
-    if not groups or min(found)[0] > AS_ALIKE:
-        return None
-    most = min(range(len(groups)), key=lambda place: found[place])
-    everywhere = found[-1][0] <= found[most][0]
-    return AlikeRepeats(int(test[groups[most][0]]), everywhere, *found[-1 if everywhere else most][1:])
-
-
 def find_two_groups(
     knee: np.ndarray, test: np.ndarray, number: np.ndarray, noise: np.ndarray, switched: Sequence[Mapping[str, str]]
 ) -> TwoGroups | None:

@@ -24,12 +24,6 @@ SHORT_MEMORY = 100.0
 BISECTIONS = 60
 #: Noise is followed up to a memory of the longest recording over this: slower, it can't be told from a bend.
 LONGEST_MEMORY = 2.0
-#: Readings in a mean, and fewest means whose differences tell a noise.
-MEANS, FEWEST_MEANS = (1, 4, 16), 8
-#: Share of the largest reading below which two differ by rounding.
-ROUNDING = 1e-9
-#: Variance of the second difference of independent numbers, over theirs.
-OF_SECOND_DIFFERENCE = 6.0
 
 
 def robust_sigma(values: np.ndarray) -> float:
@@ -130,24 +124,3 @@ def _products_of_parabolas(points: int) -> np.ndarray:
     orthonormal = np.linalg.qr(np.vander(np.linspace(-1, 1, points), TERMS))[0]
     found: np.ndarray = np.sum([np.correlate(column, column, "full") for column in orthonormal.T], axis=0)
     return found[points - 1 :]
-
-
-def least_step(q: np.ndarray) -> float:
-    """Return the least difference of two readings of flow (N,), beyond the rounding of a number; infinite without."""
-    gaps = np.diff(np.unique(q))
-    return float(gaps[gaps > ROUNDING * np.abs(q).max(initial=0.0)].min(initial=np.inf))
-
-
-def least_noise(q: np.ndarray, step: float) -> float:
-    """Return the variance of one of these readings of flow, in the order of time, as white noise at least.
-
-    0 where it is below one step of the readings, which is taken from more of them than those on a line: they may be
-    further apart than that.
-    """
-    found = [np.inf]
-    for count in MEANS:
-        whole = q.size // count * count
-        if whole >= FEWEST_MEANS * count:
-            means = q[:whole].reshape(-1, count).mean(axis=1)
-            found.append(count * float(np.mean(np.diff(means, n=2) ** 2)) / OF_SECOND_DIFFERENCE)
-    return min(found) if step**2 < min(found) < np.inf else 0.0

@@ -7,7 +7,7 @@ A copy may be saved again, rounded, in other units, decimated or cut. Rows are c
 a copy's commands and flows are in the other recording too, rounded to the coarser steps of both, at the same pressure
 drop. In a true repeat the valve opens elsewhere. If it did so by `LEAST_SHIFT` of full command only, the flow gain and
 the step of the flow tell how many rows would differ; where these are too few, as in a table of ten coarse readings,
-nothing is said. A copy whose samples are others, such as means of ten, is not found here: see `knees.between_ramps`.
+nothing is said. A copy whose samples are others, such as means of ten, is not found.
 
 A name may state the pressure drop: ``ramp_4MPa.csv``, ``V7_dP2.csv``; or may seem to: ``ramp_2_5MPa.csv``.
 """
