@@ -2,7 +2,7 @@
 
 import pytest
 
-from dzdesign.identify.reading.series import claimed_pressures, contradicts, pressures_in_name
+from dzdesign.identify.reading.series import contradicts, pressures_in_name
 
 
 @pytest.mark.parametrize(
@@ -41,10 +41,3 @@ def test_a_column_that_agrees_with_either_reading_is_no_contradiction():
     assert contradicts("ramp_2_5MPa.csv", 1e6) == "2.5 MPa or 5 MPa"
     assert contradicts("ramp_0p5MPa.csv", 5e6) == "0.5 MPa" and not contradicts("ramp_0p5MPa.csv", 0.495e6)
     assert not contradicts("V0_5MPa.csv", 5e6) and not contradicts("ramp_0_5MPa.csv", 0.495e6)
-
-
-def test_names_that_may_say_the_same_tell_nothing_apart():
-    assert claimed_pressures(["dP2_1.csv", "dP2_2.csv"]) == [2.0, 2.0]  # or 2.1 and 2.2: less alike
-    assert claimed_pressures(["V1_2MPa.csv", "V2_2MPa.csv"]) == [2e6, 2e6]
-    assert claimed_pressures(["dP0p5.csv", "dP5.csv"]) == [0.5, 5.0]
-    assert claimed_pressures(["a.csv", "dP5.csv"]) == []

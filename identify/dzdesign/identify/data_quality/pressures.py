@@ -14,7 +14,7 @@ from dzdesign.identify.data_quality.catalogue import warn
 from dzdesign.identify.ramps.pooling import SAME_PRESSURE
 from dzdesign.identify.ramps.splitting import SHUT
 from dzdesign.identify.reading.ramp_test import RampTest
-from dzdesign.identify.reading.series import claimed_pressures, contradicts
+from dzdesign.identify.reading.series import contradicts
 from dzdesign.identify.valve.model import Warning_
 from dzdesign.identify.valve.ramp_result import TestResult
 
@@ -26,7 +26,7 @@ STANDS_STILL, LEVELS, OUTERMOST = 0.05, 9, 0.005
 #: Means that differ by more than this factor are of several pressure drops, or of none that stands still.
 APART = 1.2
 #: Share by which flows at one command may differ where the pressure drop is the same, beyond what the means of the
-#: pressure drop say, for flow grows as its root: a repeated ramp, warmer oil. So may those that files' names state.
+#: pressure drop say, for flow grows as its root: a repeated ramp, warmer oil.
 SAME_FLOW = 0.1
 #: Flows are compared within this share of the largest command that all recordings reach.
 NEAR_TOP = 0.02
@@ -78,20 +78,15 @@ def about_a_stuck_sensor(tests: Sequence[RampTest]) -> Iterator[Warning_]:
         return
     explained = max(means) / min(means)
     top, flows = _flows_at_one_command(tests)
-    claims = claimed_pressures([test.source for test in tests])
-    signs: list[str] = []
     if min(flows) > 0 and max(flows) > (1 + SAME_FLOW) * explained**0.5 * min(flows):
-        signs.append(f"the flows at {Shown(top):.3g V} differ by {max(flows) / min(flows) - 1:.0%}")
-    if claims and max(claims) > (1 + SAME_FLOW) * explained * min(claims):
-        signs.append("the files' names say different ones")
-    if signs:
+        sign = f"the flows at {Shown(top):.3g V} differ by {max(flows) / min(flows) - 1:.0%}"
         one = high - low <= ONE_NUMBER * high
         about = worded(
             "{high:.6g MPa} in every row of" if one else "{low:.4g #MPa} to {high:.4g MPa} in",
             low=low / MPA,
             high=high / MPA,
         )
-        yield warn("pressure-stuck", None, "all", about=about, count=len(tests), signs=" and ".join(signs))
+        yield warn("pressure-stuck", None, "all", about=about, count=len(tests), signs=sign)
 
 
 def _stands_still(every: np.ndarray, low: float, middle: float, high: float) -> bool:

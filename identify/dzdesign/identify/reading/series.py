@@ -94,9 +94,8 @@ def ended(test: RampTest) -> float:
 # copies
 #: A number, and one that may be its whole part: names of files often can't hold a point.
 _NUMBER = r"(?:(?<!\d)(\d{1,9})([_p-]))?(?<![\d.])(\d{1,9}(?:[.,]\d{1,9})?)"
-#: A pressure in the name of a file, and a bare number after dP.
+#: A pressure in the name of a file.
 WITH_UNIT = re.compile(rf"{_NUMBER}[\s_]*(MPa|bar|kPa|psi)(?![A-Za-z])", re.IGNORECASE)
-BARE = re.compile(rf"dp[ _=-]?{_NUMBER}", re.IGNORECASE)
 UNITS = {"mpa": "MPa", "bar": "bar", "kpa": "kPa", "psi": "psi"}
 #: Pressures that differ by no more than this factor are one: nominal here, measured there.
 SAME = 1.5
@@ -188,14 +187,14 @@ def pressures_in_name(name: str) -> tuple[str, ...]:
     (('4 MPa',), ('0.5 MPa',), ('2.5 MPa', '5 MPa'))
     """
     found = {
-        _with_unit(_readings(before, mark, number, after=number), UNITS[unit.lower()])
+        _with_unit(_readings(before, mark, number), UNITS[unit.lower()])
         for before, mark, number, unit in WITH_UNIT.findall(name)
     }
     return found.pop() if len(found) == 1 else ()
 
 
-def _readings(before: str, mark: str, number: str, after: str) -> tuple[str, ...]:
-    """Return the decimal number, and the other reading if there is one; `after`: that of digits with a mark between."""
+def _readings(before: str, mark: str, number: str) -> tuple[str, ...]:
+    """Return the decimal number, and the other reading if there is one: of digits with a mark between the latter."""
     whole, _, fraction = number.replace(",", ".").partition(".")
     if fraction:
         thousands = len(fraction) == 3 and len(whole) <= 3 and int(whole) > 0
@@ -203,7 +202,7 @@ def _readings(before: str, mark: str, number: str, after: str) -> tuple[str, ...
     if not before:
         return (number,)
     decimal = f"{before}.{number}"
-    return (decimal,) if mark in "pP" else (decimal, after)
+    return (decimal,) if mark in "pP" else (decimal, number)
 
 
 def _with_unit(readings: tuple[str, ...], unit: str) -> tuple[str, ...]:
@@ -215,47 +214,6 @@ def _with_unit(readings: tuple[str, ...], unit: str) -> tuple[str, ...]:
 
 def _in_Pa(text: str) -> float:
     return parse_quantity(text, "pressure", "a file's name")
-
-
-def claimed_pressures(names: Sequence[str]) -> list[float]:
-    """Return the numbers by which files' names tell their pressures apart; none if one of them has none.
-
-    In Pa where each states a unit, and else as they stand. Where names can be read in two ways, the readings that lie
-    closest together.
-
-    Folders before a name count for nothing.
-
-    Examples
-    --------
-    >>> claimed_pressures(["a/10bar.csv", "b/2MPa.csv"]), claimed_pressures(["V7_dP2.csv", "4bar.csv"])
-    ([1000000.0, 2000000.0], [2.0, 4.0])
-    """
-    last = [name.rpartition("/")[2] for name in names]
-    stated = [pressures_in_name(name) for name in last]
-    if all(stated):
-        return _closest([[_in_Pa(text) for text in texts] for texts in stated])
-    numbers = [
-        [float(text.split()[0]) for text in texts] or _bare(name) for texts, name in zip(stated, last, strict=True)
-    ]
-    return _closest(numbers) if all(numbers) else []
-
-
-def _bare(name: str) -> list[float]:
-    found = BARE.search(name)
-    if not found:
-        return []
-    before, mark, number = (part or "" for part in found.groups())
-    return [float(text) for text in _readings(before, mark, number, after=before)]
-
-
-def _closest(readings: Sequence[Sequence[float]]) -> list[float]:
-    """Return one reading of each such that the largest is the smallest multiple of the smallest."""
-    chosen = []
-    for least in {value for values in readings for value in values}:
-        above = [[value for value in values if value >= least] for values in readings]
-        if all(above):
-            chosen.append([min(values) for values in above])
-    return min(chosen, key=lambda values: max(values) / max(min(values), 1e-9), default=[])
 
 
 def contradicts(name: str, dp: float) -> str:
