@@ -4,12 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
 
 from dzdesign.core.errors import InputError
 from dzdesign.core.option_readers import with_tolerance
 from dzdesign.identify.identification import identify
-from dzdesign.identify.knees.meter import LONGEST_UNKNOWN, softness_of_filter
+from dzdesign.identify.knees.meter import LONGEST_UNKNOWN
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.stages.identify import IdentifyArguments, identify_options
 from tests.support.bench_recordings import Valve, record
@@ -187,36 +186,3 @@ class TestLateCommand:
 
     def test_a_meter_that_lags_makes_no_command_late(self):
         assert "command-late" not in codes(recordings(0.1, seconds=100.0) + recordings(0.1, seconds=40.0))
-
-
-class TestFilter:
-    @pytest.mark.parametrize("rising", [True, False])
-    @pytest.mark.parametrize("at_level", [0.02, 0.1, 0.3])
-    def test_what_a_filter_makes_of_a_sharp_edge(self, rising, at_level):
-        """Against a filter run over samples of a ramp of unit slope and rate: the shift is the lag."""
-        lag, step = 0.2, 1e-4
-        u = np.arange(-3, 3, step) if rising else np.arange(3, -3, -step)
-        flow = np.clip(u, 0, None)
-        pole = np.exp(-step / lag)
-        q = lfilter([1 - pole], [1, -pole], flow - flow[0]) + flow[0]
-        right = u - lag if rising else u + lag
-        settled = np.arange(u.size) > u.size // 6
-        tail = settled & (q >= at_level) & (q <= 3 * at_level)
-        slope, height = np.polyfit(right[tail], q[tail], 1)
-        assert softness_of_filter(lag, at_level, 3.0, rising=rising) == pytest.approx(height / slope, abs=2e-3)
-
-    def test_no_lag_softens_nothing(self):
-        assert softness_of_filter(0.0, 0.1, 3.0, rising=True) == 0.0
-        assert softness_of_filter(1e-6, 0.1, 3.0, rising=False) == 0.0
-
-    def test_softness_that_the_meter_explains_is_said_to_be_the_meters_perhaps(self):
-        def texts(tests, **choices):
-            found = identify(tests, IdentifyOptions(repeatability=0.0, **choices)).warnings
-            return [warning.text for warning in found if warning.code == "soft-edge"]
-
-        fast = recordings(0.5, seconds=20.0, pressures=(1.0,))
-        assert all("filter" in text for text in texts(fast, meter_lag=0.5)) and texts(fast, meter_lag=0.5)
-        soft = replace(fast[0], q=recordings(0.001, pressures=(1.0,))[0].q, u=fast[0].u)
-        gentle = np.where(soft.u < 6.2, 0.3 * np.clip(soft.u - 4.2, 0, 2), 0.6 + 4 * (soft.u - 6.2)) / 6e4
-        soft = replace(soft, q=gentle + 0.02 / 6e4 * np.random.default_rng(1).standard_normal(soft.u.size))
-        assert texts([soft], meter_lag=0.001) and not any("filter" in text for text in texts([soft], meter_lag=0.001))

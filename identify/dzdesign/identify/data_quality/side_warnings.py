@@ -13,9 +13,7 @@ from dzdesign.identify.data_quality.sweeps import about_errors, about_sweeps
 from dzdesign.identify.fit.scatter import Scatter
 from dzdesign.identify.fitting.certifying import Certified
 from dzdesign.identify.knees.between_ramps import ScatterChecks
-from dzdesign.identify.knees.characteristic import TAIL
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
-from dzdesign.identify.knees.meter import softness_of_filter
 from dzdesign.identify.options import ASSUMED_REPEATABILITY, IdentifyOptions
 from dzdesign.identify.ramps.sweep_pressure import SWINGS
 from dzdesign.identify.valve.bound_proof import BoundProof
@@ -164,20 +162,10 @@ def _about_the_edge(side: SideModel, group: DescribedTests, u_max: float) -> Ite
     for test, item in zip(side.tests, group.tests, strict=True):
         knee = test.u_knee_rising_V if test.u_knee_falling_V is None else test.u_knee_falling_V
         if knee is not None and knee - test.u_guard_V > SOFT_EDGE * u_max and not item.closing_branch.tail.hole:
-            below = knee - test.u_guard_V
-            by_filter = _softness_of_the_meter(item, group)
-            case = "meter" if below <= by_filter else "valve"
-            yield warn("soft-edge", test.source, case, below_mV=1e3 * below, filter_mV=1e3 * by_filter)
+            yield warn("soft-edge", test.source, below_mV=1e3 * (knee - test.u_guard_V))
         leak = _leak_in_overlap(item, item.closing_branch.knee)
         if leak > max(LEAK_SHARE * item.q_max, group.floor):
             yield warn("leak", test.source, "in-overlap", leak_L_min=leak / L_MIN, share=OVERLAP[1])
-
-
-def _softness_of_the_meter(item: DescribedTest, group: DescribedTests) -> float:
-    """Return how far below the knee of a sharp edge the tail ends, V, by the longest lag that the meter may have."""
-    shape = item.closing_branch
-    branch = shape.prepared.branch
-    return softness_of_filter(group.lag.longest * branch.rate, shape.level / shape.slope, TAIL, rising=branch.rising)
 
 
 def _leak_in_overlap(item: DescribedTest, threshold: float) -> float:

@@ -57,8 +57,6 @@ LAG_ERRORS = 3.0
 LAG_TOLERANCE, LEAST_TOLERANCE = 0.2, 0.05
 #: Longest lag, s, that the bounds allow for where nothing tells it.
 LONGEST_UNKNOWN = 0.2
-#: Points of the course that a filter's reading takes near a sharp edge.
-FILTER_POINTS = 2000
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,24 +224,6 @@ def find_lag(ramps: Sequence[Ramp], options: IdentifyOptions) -> MeterLag:
         # No meter runs ahead of the flow; a lag found below zero says that the command may come late.
         shorter=min(taken, LAG_ERRORS * se) if seconds >= 0 else taken - seconds + LAG_ERRORS * se,
     )
-
-
-def softness_of_filter(shift: float, at_level: float, ratio: float, *, rising: bool) -> float:
-    """Return by how much a meter that is a first-order filter softens a sharp edge, V: knee less the tail's zero.
-
-    Far from the edge the filter shifts the flow by `shift` (rate times lag, V), which was taken out; at the edge it
-    rounds it. The tail is the line between the flow that the straight part reaches `at_level` (V) above the knee and
-    `ratio` times that.
-    """
-    if not shift > 0:
-        return 0.0
-    lowest = at_level / shift
-    # Of a ramp of unit slope: x is the command beyond the knee over the shift, put right for it.
-    x = np.linspace(-1.0 if rising else 1 + math.log(min(lowest, 1.0)), max(ratio * lowest, 1.0), FILTER_POINTS)
-    reading = x + np.exp(-1 - x) if rising else np.where(x >= 1, x, np.exp(np.minimum(x, 1.0) - 1))
-    tail = (reading >= lowest) & (reading <= ratio * lowest)
-    _, zero = straight_line(x[tail], reading[tail])
-    return max(-zero * shift, 0.0)
 
 
 def _declared(seconds: float, stated: float | None, left: tuple[float, float] | None) -> MeterLag:
