@@ -11,7 +11,6 @@ import pytest
 from dzdesign.command_line.cli import main
 from dzdesign.core.errors import InputError
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.reading.ramp_test import Switch
 from tests.dzdesign.command_line.test_bad_input import csv
 from tests.support.repeatable_valves import identify
 from tests.support.synthetic import L_MIN, Truth, synthetic_ramp
@@ -71,16 +70,9 @@ def test_a_flow_of_the_wrong_sign_is_not_called_a_shut_valve(wording):
         identify([dataclasses.replace(test, q=-test.q)])
 
 
-@pytest.mark.parametrize("column", [True, False])
-def test_flows_of_two_signs_under_commands_of_one_are_two_sides(column, wording):
+def test_flows_of_two_signs_under_commands_of_one_are_two_sides(wording):
     one, other = (synthetic_ramp(1.0, Truth(), seed=seed, source=f"{seed}.csv") for seed in (1, 2))
     other = dataclasses.replace(other, q=-0.8 * other.q)
-    if column:
-        none = np.empty(0)
-        one, other = (
-            dataclasses.replace(test, switches=(Switch(label="DIR", values=(bit, "x"), changes=none),))
-            for test, bit in ((one, "1"), (other, "0"))
-        )
     with wording.refusal(InputError):
         identify([one, other])
 

@@ -226,11 +226,9 @@ def _about_scatter(
         yield warn(
             "two-groups",
             tests[groups.ramps[0][0]].test.source,
-            "column" if groups.column else "ramps",
             apart_mV=1e3 * groups.apart,
-            column=groups.column,
-            low=groups.values[0] or low,
-            high=groups.values[1] or high,
+            low=low,
+            high=high,
         )
     if unlike:
         knot_MPa = scatter.model.knots_MPa[unlike.knot]

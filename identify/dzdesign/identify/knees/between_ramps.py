@@ -8,7 +8,7 @@ a normal scatter, and none of them sees everything.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,8 +43,7 @@ class RampKnees:
     se: np.ndarray
     #: When it was recorded, s on a clock common to all; NaN where that is not known.
     when: np.ndarray
-    #: What the recording's columns of two values say of each, and its name.
-    switched: Sequence[Mapping[str, str]]
+    #: Its name.
     source: tuple[str, ...]
 
 
@@ -56,9 +55,6 @@ class TwoGroups:
     apart: float
     #: Test and number in it of one ramp of each, in one test, that of the lower threshold first.
     ramps: tuple[tuple[int, int], tuple[int, int]]
-    #: Column that separates them, and what it says of each; empty where none does.
-    column: str = ""
-    values: tuple[str, str] = ("", "")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,14 +95,12 @@ def knees_of_ramps(
     shapes: Sequence[BranchShape],
     names: Sequence[tuple[str, ...]],
     when: Sequence[Sequence[float]],
-    switched: Sequence[Sequence[Mapping[str, str]]],
 ) -> RampKnees:
     """Return the zeros of lines through each ramp's samples of the straight part that the test's line rests on.
 
-    `names` has that of each ramp of each test, `when` the time of its recording, s, on one clock for all; `switched`
-    what the recording's columns of two values say of it.
+    `names` has that of each ramp of each test, `when` the time of its recording, s, on one clock for all.
     """
-    rows, marks, sources = list[tuple[float, ...]](), list[Mapping[str, str]](), list[str]()
+    rows, sources = list[tuple[float, ...]](), list[str]()
     for test, (shape, times) in enumerate(zip(shapes, when, strict=True)):
         branch, seen, told = shape.prepared.branch, shape.line.kept & ~shape.line.censored, len(rows)
         width = float(np.ptp(branch.u[seen]))
@@ -120,17 +114,15 @@ def knees_of_ramps(
             lever = 1 / u.size + (u.mean() - knee) ** 2 / float(np.sum((u - u.mean()) ** 2))
             se = shape.sigma / slope * math.sqrt(lever * shape.variance_inflation)
             rows.append((test, number, knee, se, times[number]))
-            marks.append(switched[test][number])
             sources.append(names[test][number])
         if len(rows) == told:
             rows.append((test, -1, shape.knee, shape.line.knee_se, math.nan))
-            marks.append({})
             sources.append(shape.prepared.source)
     columns = np.array(rows).reshape(-1, 5).T
     test_of, numbers = columns[:2].astype(int)
     return RampKnees(
         test=test_of, number=numbers, knee=columns[2], se=columns[3], when=columns[4],
-        switched=marks, source=tuple(sources),
+        source=tuple(sources),
     )  # fmt: skip
 
 
@@ -152,10 +144,9 @@ def compare_ramps(
         model, test, number = fit_ramp_model(ramps.only(told), share_knots=False), known.test[told], known.number[told]
         for row, at, shift in zip(test, number, _shifts(model, test), strict=True):
             shifts[row][at] = shift
-        marks = [mark for mark, tells in zip(known.switched, told, strict=True) if tells]
         checks = ScatterChecks(
             serial=find_serial_correlation(model, known.when[told]),
-            groups=find_two_groups(known.knee[told], test, number, known.se[told] ** 2, marks),
+            groups=find_two_groups(known.knee[told], test, number, known.se[told] ** 2),
         )
     return BetweenRamps(
         ramps=ramps, test=known.test, sources=known.source,
@@ -179,55 +170,11 @@ def _shifts(model: RampModel, test: np.ndarray) -> np.ndarray:
 
 
 # ------------------------------------------------------------------------------------------- the premises of the model
-def find_two_groups(
-    knee: np.ndarray, test: np.ndarray, number: np.ndarray, noise: np.ndarray, switched: Sequence[Mapping[str, str]]
-) -> TwoGroups | None:
+def find_two_groups(knee: np.ndarray, test: np.ndarray, number: np.ndarray, noise: np.ndarray) -> TwoGroups | None:
     """Return the two groups in which the ramps' knees, V (R,), lie, if a normal scatter does not make such ones.
 
-    Where a column of two values parts the ramps, one effect common to all tests is tested (Student). Elsewhere each
-    test is parted where that leaves the least squares, and the F test of it is Bonferroni's over all ways to part.
+    Each test is parted where that leaves the least squares, and the F test of it is Bonferroni's over all ways to part.
     """
-    labels = [label for label in (switched[0] if switched else ()) if all(label in each for each in switched)]
-    for label in labels:
-        if found := _parted_by(label, [each[label] for each in switched], knee, test, number, noise, len(labels)):
-            return found
-    return _parted_best(knee, test, number, noise)
-
-
-def _parted_by(
-    label: str,
-    said: Sequence[str],
-    knee: np.ndarray,
-    test: np.ndarray,
-    number: np.ndarray,
-    noise: np.ndarray,
-    tried: int,
-) -> TwoGroups | None:
-    from scipy.special import stdtr
-
-    values = sorted(set(said))
-    if len(values) != 2:
-        return None
-    second = np.array([value == values[1] for value in said])
-    of_tests = test[:, None] == np.unique(test)
-    both = [one for one in np.unique(test) if 0 < np.count_nonzero(second[test == one]) < np.count_nonzero(test == one)]
-    degrees = knee.size - of_tests.shape[1] - 1
-    if not both or degrees < 1:
-        return None
-    mean = of_tests @ ((of_tests.T @ np.column_stack([second, knee])) / of_tests.sum(axis=0)[:, None])
-    away, rise = second - mean[:, 0], knee - mean[:, 1]
-    lever = float(away @ away)
-    effect = float(away @ rise) / lever
-    squares = max(float(np.sum((rise - effect * away) ** 2)), degrees * float(noise.mean()), np.finfo(float).tiny)
-    if 2 * tried * stdtr(degrees, -abs(effect) / math.sqrt(squares / degrees / lever)) > REFUSED:
-        return None
-    high = second if effect > 0 else ~second
-    ramps = [(int(both[0]), int(number[(test == both[0]) & each][0])) for each in (~high, high)]
-    lower, upper = values if effect > 0 else values[::-1]
-    return TwoGroups(abs(effect), (ramps[0], ramps[1]), label, (lower, upper))
-
-
-def _parted_best(knee: np.ndarray, test: np.ndarray, number: np.ndarray, noise: np.ndarray) -> TwoGroups | None:
     from scipy.special import fdtrc
 
     groups = [rows for one in np.unique(test) if (rows := np.flatnonzero(test == one)).size >= FEWEST_TO_PART]

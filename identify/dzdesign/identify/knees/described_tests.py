@@ -1,7 +1,7 @@
 """`DescribedTests`: ramp tests made comparable and described, as fits, warnings and plots take them."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,8 +27,6 @@ class DescribedTest:
     ramps: tuple[str, ...]
     #: When each ramp was recorded, s on a clock common to all; NaN if that is not known.
     when: tuple[float, ...]
-    #: What the recording's columns of two values say of each ramp.
-    switched: tuple[Mapping[str, str], ...]
     #: Source and SHA-256 of every file in it.
     files: tuple[tuple[str, str], ...]
     left_out: tuple[LeftOut, ...]

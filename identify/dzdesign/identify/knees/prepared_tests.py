@@ -196,10 +196,7 @@ def _between_ramps(described: list[DescribedTest], column: int, options: Identif
     shapes = [shape for item in described if (shape := item.shapes[column])]
     if not shapes:
         return None
-    known = knees_of_ramps(
-        shapes, [item.ramps for item in described], [item.when for item in described],
-        [item.switched for item in described],
-    )  # fmt: skip
+    known = knees_of_ramps(shapes, [item.ramps for item in described], [item.when for item in described])
     dp_MPa = np.array([ANYWHERE_MPa if item.dp is None else item.dp / MPA for item in described])
     return compare_ramps(known, dp_MPa, [len(item.when) for item in described], options)
 
@@ -223,7 +220,6 @@ def _describe(item: PooledTest, shapes: Iterator[BranchShape]) -> DescribedTest:
         q_max=largest_at_top([shape.prepared.recorded for shape in (rising, falling) if shape]),
         ramps=item.ramps,
         when=item.when,
-        switched=item.switched,
         files=item.files,
         left_out=item.left_out,
     )

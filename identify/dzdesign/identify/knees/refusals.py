@@ -62,17 +62,15 @@ def refuse_two_signs_of_flow(ramps: Sequence[Ramp]) -> None:
     ):
         return
     (above, one), (below, other) = flows[True], flows[False]
-    says, its = one.test.switched_to(), other.test.switched_to()
-    column = next((label for label, value in says.items() if its.get(label, value) != value), "")
     raise InputError(
         worded(
             "the flow reaches {above:+.3g L/min} in '{one}' and {below:+.3g L/min} in '{other}', at commands of one "
-            "sign. These are two sides of the valve{column}. Give the command its sign, or each side a file of its own",
+            "sign. These are two sides of the valve, or a meter turned round. Give the command its sign, or each side "
+            "a file of its own",
             above=above / L_MIN,
             one=name_of_ramp(one),
             below=below / L_MIN,
             other=name_of_ramp(other),
-            column=f", which column '{column}' tells apart" if column else ", or a meter turned round",
         )
     )
 

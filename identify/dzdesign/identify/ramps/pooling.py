@@ -1,7 +1,7 @@
 """Ramps at one pressure drop are one test, with more data: from one recording or from several, in any order."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import chain
 
@@ -30,8 +30,6 @@ class PooledTest:
     ramps: tuple[str, ...]
     #: When each ramp was recorded, s on a clock common to all; NaN if that is not known.
     when: tuple[float, ...]
-    #: What the recording's columns of two values say of each ramp.
-    switched: tuple[Mapping[str, str], ...]
     #: Source and SHA-256 of every file in it.
     files: tuple[tuple[str, str], ...]
     #: What was left out of and before them.
@@ -80,7 +78,6 @@ def _pooled(group: list[Ramp]) -> PooledTest:
         branches=(_joined(group, rising=True), _joined(group, rising=False)),
         ramps=tuple(name_of_ramp(ramp) for ramp in group),
         when=tuple(ramp.when for ramp in group),
-        switched=tuple(ramp.test.switched_to() for ramp in group),
         files=tuple(dict.fromkeys((ramp.test.source, ramp.test.sha256) for ramp in group)),
         left_out=tuple(item for ramp in group for item in ramp.left_out),
     )

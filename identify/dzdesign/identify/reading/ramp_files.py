@@ -6,9 +6,8 @@ A long recording is thinned: see `thin`.
 import gzip
 import io
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import final
 
@@ -29,9 +28,9 @@ from dzdesign.identify.reading.missing_values import (
     without_failed_signals,
     without_placeholders,
 )
-from dzdesign.identify.reading.ramp_test import RampTest, Switch, thin
+from dzdesign.identify.reading.ramp_test import RampTest, thin
 from dzdesign.identify.reading.scaling import Scaling, in_SI, scaling_of, units_of_columns
-from dzdesign.identify.reading.table import AND, Table
+from dzdesign.identify.reading.table import Table
 
 #: Fewest complete rows in which two branches with a threshold could stand.
 MIN_ROWS = 20
@@ -39,8 +38,6 @@ MIN_ROWS = 20
 SIMULATED_MARK = "SIMULATED"
 #: A comment line that says that this is not a measurement; a spreadsheet may have put it in quotes.
 MARKED = re.compile(rf'^[ \t,;"]*#[ \t"]*{SIMULATED_MARK}\b', re.MULTILINE)
-#: A column of two values is looked for among so many, in so many rows, and changes so often at most.
-MOST_SWITCHES, LONGEST_SWITCH, MOST_CHANGES = 8, 1_000_000, 200
 
 
 def read_ramp_file(
@@ -157,7 +154,6 @@ def _ramp_test(
     without_flow = data["u"][np.isfinite(data["u"]) & ~np.isfinite(data["Q"])]
     side_without = side_without_dp(edge, labels, table.path, data["u"], u_max)
     units = units_of_columns(table.path, found, scalings["u"], u_max)
-    switches = list(_switches(table, found, rows[0], complete))
     missing = describe_missing(channels.missing)
     if rows.shape[1] < MIN_ROWS:
         left_out = f"; {', '.join(missing.values())} are missing samples" if missing else ""
@@ -188,24 +184,8 @@ def _ramp_test(
         q_range=scalings["Q"].ends,
         unseen=(float(without_flow.min(initial=0.0)), float(without_flow.max(initial=0.0))),
         units=units,
-        switches=tuple(replace(each, changes=each.changes / in_ms) for each in switches),
         columns={quantity: found[quantity] for quantity in ("u", "Q")},
     )
-
-
-def _switches(table: Table, found: Mapping[str, Column], time: np.ndarray, complete: np.ndarray) -> Iterator[Switch]:
-    """Yield the columns of two values beside those that were read, of a table that has few others."""
-    taken = {label for column in found.values() for each in column.every for label in each.label.split(AND)}
-    others = [label for label in table.labels if label and label not in taken]
-    if len(others) > MOST_SWITCHES or not 0 < time.size <= LONGEST_SWITCH:
-        return
-    for label in others:
-        with suppress(InputError):
-            two = table.two_values(label) if table.length(label) == complete.size else None
-            changes = np.flatnonzero(np.diff(two[1][complete])) + 1 if two else np.empty(0, dtype=int)
-            if two and 0 < changes.size <= MOST_CHANGES:
-                values = two[0][::-1] if two[1][complete][0] else two[0]
-                yield Switch(label=table.in_file(label), values=values, changes=time[changes])
 
 
 def _refuse_two_pressures(table: Table, found: Mapping[str, Column], dp: float | None) -> None:

@@ -21,21 +21,6 @@ MOST_ROWS = 400_000
 PART = 1 << 17
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Switch:
-    """A column of a recording that holds two values, such as a direction bit."""
-
-    label: str
-    #: That of the first row, and the other one.
-    values: tuple[str, str]
-    #: Times from which the other value holds, s.
-    changes: np.ndarray
-
-    def at(self, time: float) -> str:
-        """Return its value at a time of the recording, s."""
-        return self.values[int(np.searchsorted(self.changes, time, side="right")) % 2]
-
-
 def despiked(u: np.ndarray) -> np.ndarray:
     """Return the running median of three: a single sample that stands out is gone, a step stays where it was."""
     if u.size < 3:
@@ -97,8 +82,6 @@ class RampTest:
     columns: Mapping[str, Column] = field(default_factory=dict)
     #: Units of the file's columns, each once; `u`, `dp` and `q` are in SI.
     units: Mapping[Quantity, tuple[Unit, ...]] = field(default_factory=dict)
-    #: Columns beside those that were read, of two values each.
-    switches: tuple[Switch, ...] = ()
 
     def __post_init__(self) -> None:
         for array in (self.time, self.u, self.q, self.dp, self.beyond):
@@ -123,11 +106,6 @@ class RampTest:
     def unseen_top(self, least: float) -> float:
         """Return the largest command of rows without a flow, V; 0 unless it is more than `least` above all others."""
         return self.unseen[1] if self.u.size and self.unseen[1] > float(self.u.max()) + least else 0.0
-
-    def switched_to(self) -> dict[str, str]:
-        """Return what its columns of two values say at the largest command."""
-        at_top = float(self.time[np.argmax(np.abs(self.u))])
-        return {switch.label: switch.at(at_top) for switch in self.switches}
 
     def part(self, rows: slice | np.ndarray) -> "RampTest":
         """Return the recording with some of its rows; of all of them itself, whose command is smoothed once."""

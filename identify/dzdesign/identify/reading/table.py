@@ -100,14 +100,6 @@ class Table(ABC):
         """Return a column of dates or times of day, as `is_clock` tells, as seconds since the first row of the file."""
         raise TypeError(f"column '{label}' holds numbers")
 
-    def two_values(self, label: str) -> tuple[tuple[str, str], np.ndarray] | None:
-        """Return the two values that a column holds, and where it holds the second; None if it holds others."""
-        numbers = self.numbers(label)
-        values = np.unique(numbers[np.isfinite(numbers)])
-        if values.size != 2:
-            return None
-        return (f"{values[0]:g}", f"{values[1]:g}"), numbers == values[1]
-
     def dated(self, label: str) -> str:
         """Return a column of times of day with the only one of their dates, as ``Date + Time``; else the label itself.
 

@@ -121,14 +121,6 @@ class TextTable(Table):
         self.cells.replace_column(place, numbers.fill_null(np.nan))  # both would double the memory of a long recording
         return np.asarray(self.cells.to_series(place).to_numpy())
 
-    def two_values(self, label: str) -> tuple[tuple[str, str], np.ndarray] | None:
-        """Return the two texts that a column holds, and where it holds the second; None if it holds others."""
-        texts = self._texts(label)
-        if texts.head(FEW_ROWS).n_unique() > 2:
-            return None
-        values = [str(text) for text in texts.unique().sort() if text]
-        return ((values[0], values[1]), (texts == values[1]).to_numpy()) if len(values) == 2 else None
-
     def is_clock(self, label: str) -> bool:
         """Tell whether the first cell of a column that is not blank holds a time of day."""
         cell = self._first(label)
