@@ -12,7 +12,7 @@ from dzdesign.core.recorded_units import RecordedUnits, shown_in
 from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.data_quality.catalogue import most_serious_first, warn
 from dzdesign.identify.data_quality.meter_faults import without_clipping, without_drop_outs
-from dzdesign.identify.data_quality.pressures import about_mixed_pressures, about_single_pressures
+from dzdesign.identify.data_quality.pressures import about_mixtures, about_single_pressures
 from dzdesign.identify.data_quality.recordings import about_recordings, about_rest, about_whole_meter
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.command import without_dither
@@ -139,8 +139,8 @@ def _each_side(
                 raise InputError(f"{by_hand[0].source} is of {name} commands, but no ramp test is; record one")
             continue
         with shown_in(units.of_side(name)):
-            mixed = about_mixed_pressures(of_side)
-            pressures = (*mixed, *about_single_pressures(of_side, mixed))
+            mixed = tuple(about_mixtures(of_side))
+            pressures = (*mixed, *about_single_pressures(of_side))
             # At the end of its range a meter stands still as one that is stuck does.
             of_side, clipped = without_clipping(of_side, options.u_max)
             of_side, dropped = without_drop_outs(of_side)

@@ -8,8 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from dzdesign.core.recorded_units import worded
-from dzdesign.identify.constants import FULL_SWEEP, L_MIN, MPA, Shown
+from dzdesign.identify.constants import FULL_SWEEP, L_MIN, MPA
 from dzdesign.identify.data_quality.catalogue import warn
 from dzdesign.identify.ramps.pooling import SAME_PRESSURE
 from dzdesign.identify.ramps.splitting import SHUT
@@ -20,14 +19,10 @@ from dzdesign.identify.valve.ramp_result import TestResult
 
 #: Pressure drops that differ by less than this share are one number: averaging may round the last digit.
 ONE_NUMBER = 1e-12
-#: A pressure drop stands still if all but the outermost readings lie within this share of it, or on so few levels of
-#: the converter: two a port to either side.
-STANDS_STILL, LEVELS, OUTERMOST = 0.05, 9, 0.005
-#: Means that differ by more than this factor are of several pressure drops, or of none that stands still.
+#: Pressure drops that differ by more than this factor are several, or one that does not stand still.
 APART = 1.2
-#: Share by which flows at one command may differ where the pressure drop is the same, beyond what the means of the
-#: pressure drop say, for flow grows as its root: a repeated ramp, warmer oil.
-SAME_FLOW = 0.1
+#: Share of the readings, at either end, among which spikes may lie.
+OUTERMOST = 0.005
 #: Flows are compared within this share of the largest command that all recordings reach.
 NEAR_TOP = 0.02
 #: A flow below this share of the largest one is none to compare: the command does not open the valve.
@@ -47,55 +42,11 @@ FALLS, GROWS_TOO_LITTLE, GROWS_TOO_MUCH = 0.9, 2.5, 1.75
 WIDE_APART, NO_GROWTH = 1.4, 0.12
 
 
-def about_mixed_pressures(tests: Sequence[RampTest]) -> tuple[Warning_, ...]:
-    """Return what tells that recordings of several pressure drops pass for one: a stuck sensor, or else their flows."""
-    return tuple(about_a_stuck_sensor(tests)) or tuple(about_mixtures(tests))
-
-
-def about_single_pressures(tests: Sequence[RampTest], mixed: Sequence[Warning_]) -> tuple[Warning_, ...]:
-    """Return what is weak in the pressure drop of single recordings; of a stuck one not that it was typed in.
-
-    Beside a stuck sensor, which `mixed` may tell of, there is nothing more to say.
-    """
-    if any(item.code == "pressure-stuck" for item in mixed):
-        return ()
+def about_single_pressures(tests: Sequence[RampTest]) -> tuple[Warning_, ...]:
+    """Return what is weak in the pressure drop of single recordings; of a stuck one not that it was typed in."""
     stuck = tuple(about_stuck_recordings(tests))
     known = {item.source for item in stuck}
     return (*stuck, *(item for item in about_typed_pressures(tests) if item.source not in known))
-
-
-def about_a_stuck_sensor(tests: Sequence[RampTest]) -> Iterator[Warning_]:
-    """Yield a warning if the recordings of one side show one pressure drop, noise aside, and must have several."""
-    recorded = [test.dp for test in tests if test.dp is not None and not test.dp_is_declared]
-    if len(tests) < 2 or len(recorded) < len(tests):
-        return
-    means = [float(dp.mean()) for dp in recorded]
-    if min(means) <= 0 or max(means) > APART * min(means):
-        return
-    every = np.concatenate(recorded)
-    low, middle, high = (float(value) for value in np.quantile(every, [OUTERMOST, 0.5, 1 - OUTERMOST]))
-    if not _stands_still(every, low, middle, high):
-        return
-    explained = max(means) / min(means)
-    top, flows = _flows_at_one_command(tests)
-    if min(flows) > 0 and max(flows) > (1 + SAME_FLOW) * explained**0.5 * min(flows):
-        sign = f"the flows at {Shown(top):.3g V} differ by {max(flows) / min(flows) - 1:.0%}"
-        one = high - low <= ONE_NUMBER * high
-        about = worded(
-            "{high:.6g MPa} in every row of" if one else "{low:.4g #MPa} to {high:.4g MPa} in",
-            low=low / MPA,
-            high=high / MPA,
-        )
-        yield warn("pressure-stuck", None, "all", about=about, count=len(tests), signs=sign)
-
-
-def _stands_still(every: np.ndarray, low: float, middle: float, high: float) -> bool:
-    """Tell whether readings are one number and the noise of a converter."""
-    if high - low <= STANDS_STILL * middle:
-        return True
-    inner = every[(every >= low) & (every <= high)]
-    # One level computed from two ports, or averaged, differs in its last digits.
-    return middle > 0 and np.unique(np.round(inner / middle, 6)).size <= LEVELS
 
 
 def _flows_at_one_command(tests: Sequence[RampTest]) -> tuple[float, list[float]]:
@@ -122,7 +73,7 @@ def about_stuck_recordings(tests: Sequence[RampTest]) -> Iterator[Warning_]:
         signs = ["that of other recordings scatters"] if scatters and test.u.size >= ROWS else []
         signs += [f"the file's name says {stated}"] if stated else []
         if signs:
-            yield warn("pressure-stuck", test.source, "one", dp_MPa=dp / MPA, signs=" and ".join(signs))
+            yield warn("pressure-stuck", test.source, dp_MPa=dp / MPA, signs=" and ".join(signs))
 
 
 def about_typed_pressures(tests: Sequence[RampTest]) -> Iterator[Warning_]:
