@@ -176,13 +176,6 @@ def codes(valve):
 
 
 class TestQualityGate:
-    def test_a_lag_too_large_for_the_ramp_is_said(self, wording):
-        tests = [delayed(synthetic_ramp(dp, Truth(), ramp_s=10.0), 0.5) for dp in PRESSURES]
-        valve = identify(tests, IdentifyOptions(meter_lag=0.5))
-        (warning,) = [warning for warning in valve.warnings if warning.code == "lag-large"]
-        wording.of_test(warning.text)
-        assert "lag-large" not in codes(identify(tests, IdentifyOptions(meter_lag=0.01)))
-
     def test_noise_that_hides_the_knee_is_said(self):
         quiet, loud = (identify([synthetic_ramp(1.0, Truth(noise=noise), ramp_s=20.0)]) for noise in (0.05, 2.0))
         assert "noise" in codes(loud) and "noise" not in codes(quiet)

@@ -13,9 +13,7 @@ from dzdesign.identify.valve.guard_curve import Guard
 from dzdesign.identify.valve.model import Warning_
 from dzdesign.identify.valve.side_model import PROMISED, SideModel
 
-#: Shift of the knees by the meter's lag, over u_max, above which a tenth of it matters.
-LARGE_LAG = 1e-2
-#: The same, above which a declared lag is not to be taken unchecked.
+#: Shift of the knees by the meter's lag, over u_max, above which a declared lag is not to be taken unchecked.
 NOTED_LAG = 1.5e-3
 #: Lag that a flow meter without a word about it may well have, s.
 LIKELY_LAG = 0.1
@@ -37,7 +35,6 @@ def about_the_meter(side: SideModel, group: DescribedTests, options: IdentifyOpt
     yield from _about_the_noise_level(side, options)
     yield from _about_steps(side, group.tests, options)
     yield from _about_the_lag(group, options)
-    yield from _about_lag_and_order(side, group)
 
 
 def _about_a_hidden_zero(side: SideModel) -> Iterator[Warning_]:
@@ -119,9 +116,6 @@ def _about_the_lag(group: DescribedTests, options: IdentifyOptions) -> Iterator[
     elif lag.origin == "unknown":
         shift_mV = 1e3 * fastest * LIKELY_LAG
         yield warn("lag-unknown", lag_s=LIKELY_LAG, shift_mV=shift_mV, rate_V_s=fastest, longest_s=lag.longer)
-    elif fastest * lag.seconds > LARGE_LAG * options.u_max:
-        shift_mV = 1e3 * fastest * lag.seconds
-        yield warn("lag-large", lag_s=lag.seconds, shift_mV=shift_mV, rate_V_s=fastest, tenth_mV=0.1 * shift_mV)
     if lag.origin == "declared" and not lag.seen_by_rates and fastest * lag.seconds > NOTED_LAG * options.u_max:
         shift_mV, tolerance_mV = 1e3 * fastest * lag.seconds, 1e3 * fastest * lag.shorter
         yield warn("lag-unchecked", lag_s=lag.seconds, shift_mV=shift_mV, rate_V_s=fastest, tolerance_mV=tolerance_mV)
@@ -132,20 +126,6 @@ def _about_the_lag(group: DescribedTests, options: IdentifyOptions) -> Iterator[
     elif lag.seconds < 0:
         late, shift_mV = -lag.seconds, -1e3 * fastest * lag.seconds
         yield warn("command-late", late_s=late, error_s=lag.longer, shift_mV=shift_mV, rate_V_s=fastest)
-
-
-def _about_lag_and_order(side: SideModel, group: DescribedTests) -> Iterator[Warning_]:
-    """Say of a declared lag that it puts the closing knee above the opening one by more than its tolerance may."""
-    lag = group.lag
-    if lag.origin != "declared" or lag.seconds == 0 or None in group.tests[0].shapes:
-        return
-    for test, opening, closing in zip(side.tests, *(group.rates(column) for column in (0, 1)), strict=True):
-        opens, closes = test.u_knee_rising_V, test.u_knee_falling_V
-        if opens is None or closes is None or not test.closes_above_opening:
-            continue
-        longer_s = (closes - opens) / (opening + closing)
-        if longer_s > lag.shorter:
-            yield warn("lag-contradicted", test.source, "branches", lag_s=lag.seconds, longer_s=longer_s)
 
 
 def about_low_flow(side: SideModel, lowered: Mapping[Guard, Lowered]) -> Iterator[Warning_]:
