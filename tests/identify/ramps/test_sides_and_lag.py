@@ -180,12 +180,6 @@ class TestQualityGate:
         quiet, loud = (identify([synthetic_ramp(1.0, Truth(noise=noise), ramp_s=20.0)]) for noise in (0.05, 2.0))
         assert "noise" in codes(loud) and "noise" not in codes(quiet)
 
-    def test_a_leak_inside_the_overlap_is_said(self):
-        tight = synthetic_ramp(1.0, Truth())
-        share = np.clip((tight.u - 2.0) / 3.4, 0, 1)
-        leaky = replace(tight, q=tight.q + 0.2 * L_MIN * share)
-        assert "leak" in codes(identify([leaky])) and "leak" not in codes(identify([tight]))
-
     def test_a_pressure_that_sags_by_more_than_a_third_is_said(self):
         assert "pressure-sag" in codes(identify([synthetic_ramp(1.0, Truth(sag=0.4))]))
         assert "pressure-sag" not in codes(identify([synthetic_ramp(1.0, Truth(sag=0.2))]))

@@ -50,7 +50,7 @@ def _about_a_leak(side: SideModel) -> Iterator[Warning_]:
     if worst.leak_L_min > 0 and worst.dp_MPa:
         shift_mV = 1e3 * max(test.leak_L_min / test.slope_L_min_V for test in side.tests)
         leak = worst.leak_L_min
-        yield warn("leak", worst.source, "at-rest", per_MPa=leak / worst.dp_MPa, leak_L_min=leak, shift_mV=shift_mV)
+        yield warn("leak", worst.source, per_MPa=leak / worst.dp_MPa, leak_L_min=leak, shift_mV=shift_mV)
 
 
 def _about_the_zero_flow(side: SideModel, group: DescribedTests) -> Iterator[Warning_]:

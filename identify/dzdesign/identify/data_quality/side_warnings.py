@@ -22,12 +22,8 @@ from dzdesign.identify.valve.side_model import Repeatability, SideModel
 
 #: A softer edge than this share of u_max between knee and the tail's zero is said.
 SOFT_EDGE = 5e-3
-#: Shares of the guarded threshold between which a leak inside the overlap is looked for, and its standard errors.
-OVERLAP, LEAK_SIGNIFICANCE = (0.6, 0.85), 5.0
 #: Distance of opening and closing knee over u_max above which dither is missing, or there is play.
 WIDE_HYSTERESIS = 0.03
-#: A leak below this share of the largest flow is not worth a word.
-LEAK_SHARE = 1e-3
 #: Half swings of the pressure drop on one ramp, while the valve is shut, from which it swings.
 FEWEST_SWINGS = 6
 #: With fewer degrees of freedom the scatter is known so badly that repeats pay twice.
@@ -163,22 +159,6 @@ def _about_the_edge(side: SideModel, group: DescribedTests, u_max: float) -> Ite
         knee = test.u_knee_rising_V if test.u_knee_falling_V is None else test.u_knee_falling_V
         if knee is not None and knee - test.u_guard_V > SOFT_EDGE * u_max and not item.closing_branch.tail.hole:
             yield warn("soft-edge", test.source, below_mV=1e3 * (knee - test.u_guard_V))
-        leak = _leak_in_overlap(item, item.closing_branch.knee)
-        if leak > max(LEAK_SHARE * item.q_max, group.floor):
-            yield warn("leak", test.source, "in-overlap", leak_L_min=leak / L_MIN, share=OVERLAP[1])
-
-
-def _leak_in_overlap(item: DescribedTest, threshold: float) -> float:
-    """Return by how much the flow inside the overlap exceeds that near zero, m³/s; zero within its error."""
-    branch = item.closing_branch.prepared.branch
-    near_zero = branch.q[branch.u < 0.3 * threshold]
-    inside = branch.q[(branch.u > OVERLAP[0] * threshold) & (branch.u < OVERLAP[1] * threshold)]
-    if min(near_zero.size, inside.size) < 20:
-        return 0.0
-    blocks = [np.array([block.mean() for block in np.array_split(part, 8)]) for part in (near_zero, inside)]
-    gap = float(np.median(blocks[1]) - np.median(blocks[0]))
-    error = float(np.sqrt(sum(np.var(means, ddof=1) / means.size for means in blocks)))
-    return gap if gap > LEAK_SIGNIFICANCE * error else 0.0
 
 
 def about_ramps(
