@@ -24,9 +24,9 @@ from dzdesign.design.firmware_manifest import FirmwareManifest, OutputManifest
 from dzdesign.design.signal_text import parse_signal
 from dzdesign.identify.reading.column_labels import parse_columns
 from dzdesign.identify.reading.columns import find_columns
-from dzdesign.identify.reading.low_flow_readings import EXAMPLE, read_low_flow
 from dzdesign.identify.reading.ramp_files import read_ramp_file
 from dzdesign.identify.reading.text_file import read_text_table
+from dzdesign.identify.valve.low_flow import EXAMPLE, read_low_flow
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.lot.summary import ValveManifest
 from dzdesign.verify.closed_loop.plant import read_plant

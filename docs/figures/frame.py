@@ -5,8 +5,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dzdesign.identify.plots.frame import METADATA
-from dzdesign.identify.plots.style import STYLE
+from dzdesign.identify.plots.style import METADATA, STYLE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

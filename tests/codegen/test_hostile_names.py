@@ -148,8 +148,7 @@ def test_hostile_names_compile_without_a_warning(both, tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES, ids=range(len(NAMES)))
 def test_a_name_in_a_plot(name):
-    from dzdesign.identify.plots.frame import finish, new_figure, saved
-    from dzdesign.identify.plots.style import plot_style
+    from dzdesign.identify.plots.style import finish, new_figure, plot_style, saved
 
     with plot_style():
         figure = new_figure(2.0, f"1 MPa: {one_line(name)}", name)

@@ -131,7 +131,7 @@ def test_inside_a_room_imports_run_down(graph, room):
     [
         ("dzdesign.identify.reading.clock", "from dzdesign.identify.ramps.branches import Branch"),
         ("dzdesign.identify.valve.model", "def f():\n    from dzdesign.identify.fitting import bounds"),
-        ("dzdesign.identify.plots.frame", "from dzdesign.identify.identification import identify"),
+        ("dzdesign.identify.plots.style", "from dzdesign.identify.identification import identify"),
     ],
 )
 def test_a_seeded_import_upwards_is_found(graph, module, line):

@@ -15,7 +15,7 @@ from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
 from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.knees.gated_line import GATE, straight_line
 from dzdesign.identify.knees.profile import crossing
-from dzdesign.identify.ramps.medians import median
+from dzdesign.identify.ramps.branches import median
 from dzdesign.identify.valve.reading_flow import ideal_line
 
 #: Shares of the largest flow at which the branches' distance is taken, and the fewest of them.

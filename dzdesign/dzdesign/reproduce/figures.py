@@ -8,8 +8,7 @@ import numpy as np
 from dzdesign.derivation.account import published as paper
 from dzdesign.derivation.account.published import DP0_MPA, DP1_MPA, U_MAX_V, PublishedValve
 from dzdesign.derivation.law import law
-from dzdesign.identify.plots.frame import finish, new_figure, saved
-from dzdesign.identify.plots.style import plot_style
+from dzdesign.identify.plots.style import finish, new_figure, plot_style, saved
 from dzdesign.reproduce.law_numbers import law_of
 from dzdesign.reproduce.recovered_valves import METER_START_L_MIN, AtRest, printed_at
 from dzdesign.reproduce.runs import DIRECT, PRESSURES_MPA, PRODUCT, WITHOUT_BETA, ValveRuns

@@ -137,7 +137,7 @@ def identify(arguments: IdentifyArguments) -> "ValveModel":
     from dzdesign.core.artefact_types import to_json_bytes
     from dzdesign.identify.identification import identify_sides
     from dzdesign.identify.plots.valve_plots import plot_files
-    from dzdesign.identify.reading.low_flow_readings import read_low_flow
+    from dzdesign.identify.valve.low_flow import read_low_flow
 
     options, record = identify_options(arguments), record_of(arguments.record)
     _check_places(arguments)
@@ -216,7 +216,7 @@ def read_again(options: "StatedOptions", files: Mapping[str, Path]) -> ReadAgain
     InputError
         If an option or a file can't be read.
     """
-    from dzdesign.identify.reading.low_flow_readings import read_low_flow
+    from dzdesign.identify.valve.low_flow import read_low_flow
 
     known = {argument.name for argument in arguments_of(IdentifyArguments)} - {*NOT_STATED, "order"}
     given: dict[str, Any] = {**options.texts, **options.tables, **options.lists}

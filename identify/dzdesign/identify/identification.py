@@ -17,11 +17,10 @@ from dzdesign.identify.data_quality.recordings import about_recordings, about_re
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.command import without_dither
 from dzdesign.identify.ramps.sides import tests_of_side
-from dzdesign.identify.reading.low_flow_readings import readings_of_side
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.reading.scaling import units_of
 from dzdesign.identify.side import Identification, SideIdentification, identify_side
-from dzdesign.identify.valve.low_flow import LowFlow
+from dzdesign.identify.valve.low_flow import LowFlow, readings_of_side
 from dzdesign.identify.valve.model import DECIMALS, SIDES, Meter, ValveModel, Warning_
 
 #: What ramps of several pressure drops show where a stuck sensor has made one test of them: no word on meter or valve.

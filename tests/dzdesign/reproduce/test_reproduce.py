@@ -20,8 +20,7 @@ from dzdesign.core.documents import sha256_of
 from dzdesign.derivation.account.published import RAMP_S, SIMULATION, VALVES
 from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
-from dzdesign.identify.plots.frame import saved
-from dzdesign.identify.plots.style import plot_style
+from dzdesign.identify.plots.style import plot_style, saved
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.reproduce import figures, law_numbers, runs
 from dzdesign.reproduce.artefact import Reproduction

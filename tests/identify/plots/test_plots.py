@@ -11,8 +11,7 @@ from matplotlib.figure import Figure
 
 from dzdesign.command_line.cli import main
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.plots.frame import pressure_names
-from dzdesign.identify.plots.style import plot_style
+from dzdesign.identify.plots.style import plot_style, pressure_names
 from dzdesign.identify.plots.valve_curves import BOUND_NAME, draw_thresholds
 from dzdesign.identify.plots.valve_plots import MOST_POINTS, RESIDUAL_EDGE, draw_figures, plot_files
 from tests.support.repeatable_valves import identify_sides

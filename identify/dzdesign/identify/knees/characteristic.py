@@ -19,7 +19,7 @@ from dzdesign.identify.knees.linear_region import StraightParts, find_straight_p
 from dzdesign.identify.knees.noise import measure_roughness, robust_sigma, variance_inflation
 from dzdesign.identify.knees.profile import crossing, hole_within
 from dzdesign.identify.knees.spool_ripple import spool_ripples
-from dzdesign.identify.ramps.medians import median
+from dzdesign.identify.ramps.branches import median
 
 #: Standard deviations of a shut reading above which the mean of a bin is flow.
 FIRST_SEEN = 5.0

@@ -10,8 +10,7 @@ from dzdesign.identify.knees.described_tests import DescribedTest
 from dzdesign.identify.knees.gated_line import BranchShape
 from dzdesign.identify.knees.noise import robust_sigma
 from dzdesign.identify.knees.profile import smooth_profile
-from dzdesign.identify.ramps.branches import Branch
-from dzdesign.identify.ramps.medians import median
+from dzdesign.identify.ramps.branches import Branch, median
 from dzdesign.identify.valve.recorded_curve import (
     MOST_POINTS,
     MOST_SAMPLES,

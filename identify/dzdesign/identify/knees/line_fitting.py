@@ -10,7 +10,7 @@ from dzdesign.identify.constants import Shown
 from dzdesign.identify.knees.gated_line import GATE, GatedLine, PreparedBranch, straight_line
 from dzdesign.identify.knees.noise import Roughness, measure_roughness
 from dzdesign.identify.knees.profile import crossing
-from dzdesign.identify.ramps.medians import median
+from dzdesign.identify.ramps.branches import median
 
 #: Most rounds in which outliers are left out and the line is laid again: each finds those that the ones before hid.
 ROUNDS = 20

@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from dzdesign.identify.ramps.medians import median
+from dzdesign.identify.ramps.branches import median
 
 #: Parameters of a parabola.
 TERMS = 3

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from dzdesign.identify.ramps.branches import Branch, bin_index
-from dzdesign.identify.ramps.medians import median
+from dzdesign.identify.ramps.branches import Branch, bin_index, median
 
 #: Share of the command's range, from the top, over which the largest flow is read.
 TOP = 0.05

@@ -14,7 +14,7 @@ import numpy as np
 
 from dzdesign.identify.knees.noise import robust_sigma
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.ramps.medians import median
+from dzdesign.identify.ramps.branches import median
 from dzdesign.identify.reading.ramp_test import RampTest, once_a_recording
 
 #: Commands within this share of u_max are at rest; a wider one is taken where so few readings would be left.

@@ -11,8 +11,7 @@ from dzdesign.identify.knees.described_tests import DescribedTest
 from dzdesign.identify.knees.gated_line import PreparedBranch
 from dzdesign.identify.knees.noise import robust_sigma
 from dzdesign.identify.knees.profile import crossing, largest_flow
-from dzdesign.identify.ramps.branches import Branch
-from dzdesign.identify.ramps.medians import median
+from dzdesign.identify.ramps.branches import Branch, median
 from dzdesign.identify.ramps.pooling import name_of_ramp
 from dzdesign.identify.ramps.splitting import Ramp
 from dzdesign.identify.reading.ramp_test import RampTest

@@ -12,8 +12,7 @@ from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.knees.described_tests import DescribedTest
 from dzdesign.identify.knees.gated_line import BranchShape
-from dzdesign.identify.plots.frame import finish, new_figure, pressure_names, saved
-from dzdesign.identify.plots.style import HUES, plot_style
+from dzdesign.identify.plots.style import HUES, finish, new_figure, plot_style, pressure_names, saved
 from dzdesign.identify.plots.valve_curves import BRANCHES, draw_beta, draw_thresholds, tested_pressures
 from dzdesign.identify.side import Identification, SideIdentification
 from dzdesign.identify.valve.model import ValveModel

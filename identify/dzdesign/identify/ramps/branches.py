@@ -51,3 +51,11 @@ def bin_index(u: np.ndarray, u_max: float) -> tuple[np.ndarray, np.ndarray]:
     count = np.bincount(index)
     filled = count > 0
     return (index, count) if filled.all() else ((np.cumsum(filled) - 1)[index], count[filled])
+
+
+def median(values: np.ndarray) -> float:
+    """Return the median of one or more numbers, none of them NaN: NumPy's looks for those, at twice the time."""
+    half = values.size // 2
+    parted = np.partition(values, half)
+    upper = float(parted[half])
+    return upper if values.size % 2 else (float(parted[:half].max()) + upper) / 2

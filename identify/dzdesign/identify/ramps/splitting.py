@@ -17,7 +17,7 @@ from itertools import pairwise
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.ramps.branches import Branch
+from dzdesign.identify.ramps.branches import Branch, median
 from dzdesign.identify.ramps.command import (
     SMALLEST_MOVE,
     TURN,
@@ -25,7 +25,6 @@ from dzdesign.identify.ramps.command import (
     sweep_direction,
     without_command_spikes,
 )
-from dzdesign.identify.ramps.medians import median
 from dzdesign.identify.ramps.staircases import find_staircase
 from dzdesign.identify.ramps.sweep_pressure import (
     SHUT_FLOW,

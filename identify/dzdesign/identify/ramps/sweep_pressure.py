@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from dzdesign.identify.constants import L_MIN, MPA
-from dzdesign.identify.ramps.medians import median
+from dzdesign.identify.ramps.branches import median
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.left_out import LeftOut
 

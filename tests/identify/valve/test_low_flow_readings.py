@@ -3,7 +3,7 @@
 import pytest
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.reading.low_flow_readings import EXAMPLE, read_low_flow, readings_of_side
+from dzdesign.identify.valve.low_flow import EXAMPLE, read_low_flow, readings_of_side
 
 
 @pytest.mark.parametrize(
