@@ -148,12 +148,13 @@ def _side_model(
     several = len(described) > 1
     k_mm = 1 / (options.x_max * 1e3) if options.x_max else None
     rows = range(len(described))
+    drop = tuple(dict.fromkeys(each for item in described for each in item.test.dp_from[0]))
     level = group.noise_level / L_MIN
     unseen = unseen_of_curve(low_flow, guard, curves[guard], level).below_L_min
     # Readings by hand at the threshold tell what a meter that hides its zero can't.
     unseen = max(unseen, group.hidden_zero / L_MIN) if unseen == level else unseen
     return SideModel(
-        recorded_drop=_recorded_drop(described),
+        recorded_drop=RecordedDrop(columns=drop, sign=described[0].test.dp_sign) if drop else None,
         tests=tuple(_test_result(group, knees, row, curves[guard], options, units) for row in rows),
         reference=Reference(
             dp_MPa=None if dp0 is None else dp0 / MPA,
@@ -181,12 +182,6 @@ def _side_model(
         certified=curves,
         opening_curve=opening_curve(knees, trend.direction, curves, options.u_max),
     )
-
-
-def _recorded_drop(described: tuple[DescribedTest, ...]) -> RecordedDrop | None:
-    """Return which columns made the pressure drop, and with which sign; None where it was declared or is unknown."""
-    columns = tuple(dict.fromkeys(each for item in described for each in item.test.dp_from[0]))
-    return RecordedDrop(columns=columns, sign=described[0].test.dp_sign) if columns else None
 
 
 def _repeatability(found: Scatter, tests: int) -> Repeatability:

@@ -47,9 +47,10 @@ def find_warnings(
     within its error, and of no matter under another premise. `certified` is the default guard's curve, with what the
     tests say against a premise.
     """
+    checks = group.between(1 if side.certificate.guard == "closing" else 0).checks
     return (
         *about_the_meter(side, group, options),
-        *about_ramps(side, certified.scatter, _checks(side, group), group.tests, options),
+        *about_ramps(side, certified.scatter, checks, group.tests, options),
         *(
             warn(
                 "not-monotone",
@@ -59,7 +60,10 @@ def find_warnings(
             for test, gap in zip(side.tests, departure, strict=True)
             if gap > 0
         ),
-        *_about_premises(side, certified),
+        *(
+            warn("premise-refused", premise=each.premise, p=each.lack_of_fit_p or 0.0, taken=side.curve.premise)
+            for each in filter(None, [certified.refused])
+        ),
         *(
             warn("stick-slip", test.source, ripple_mV=1e3 * test.spool_ripple_V, stop_mV=1.732e3 * test.spool_ripple_V)
             for test in side.tests
@@ -72,16 +76,6 @@ def find_warnings(
         *about_errors(side, group.tests, options.u_max, options.knee_window),
         *_about_the_edge(side, group, options.u_max),
     )
-
-
-def _about_premises(side: SideModel, certified: Certified) -> Iterator[Warning_]:
-    refused, taken = certified.refused, side.curve.premise
-    if refused:
-        yield warn("premise-refused", premise=refused.premise, p=refused.lack_of_fit_p or 0.0, taken=taken)
-
-
-def _checks(side: SideModel, group: DescribedTests) -> ScatterChecks:
-    return group.between(1 if side.certificate.guard == "closing" else 0).checks
 
 
 def _about_hysteresis(side: SideModel, group: DescribedTests, u_max: float) -> Iterator[Warning_]:

@@ -6,6 +6,7 @@ along, so the residuals look both smaller and quicker than the noise is; what th
 and turned round.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -20,8 +21,6 @@ TERMS = 3
 POINTS = 400
 #: Lengths of the noise's memory that a recording must hold for its ends not to matter.
 SHORT_MEMORY = 100.0
-#: Steps of the bisection for the correlation, in the logarithm of 1 - r.
-BISECTIONS = 60
 #: Noise is followed up to a memory of the longest recording over this: slower, it can't be told from a bend.
 LONGEST_MEMORY = 2.0
 
@@ -56,6 +55,8 @@ def shared_correlation(roughness: Sequence[Roughness]) -> float:
 
     It is zero for white noise, and just below 1 where the noise is slower than the recordings can show.
     """
+    from scipy.optimize import brentq
+
     measured = [item for item in roughness if item.n > 2 * TERMS and item.steps > 0]
     if not measured:
         return 0.0
@@ -73,11 +74,7 @@ def shared_correlation(roughness: Sequence[Roughness]) -> float:
     slowest = LONGEST_MEMORY / max(item.n for item in measured)
     if excess(slowest) >= 0:
         return 1 - slowest
-    low, high = np.log(slowest), 0.0
-    for _ in range(BISECTIONS):
-        middle = (low + high) / 2
-        low, high = (low, middle) if excess(float(np.exp(middle))) > 0 else (middle, high)
-    return 1 - float(np.exp((low + high) / 2))
+    return 1 - math.exp(brentq(lambda log_rate: excess(math.exp(log_rate)), math.log(slowest), 0.0, xtol=1e-15))
 
 
 def correlation_upper_limit(correlation: float, roughness: Sequence[Roughness]) -> float:

@@ -62,7 +62,8 @@ def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> Descr
     ramps = split_recordings(tests, options, options.meter_lag or 0.0)
     lag = find_lag(ramps, options)
     pooled = pool_ramps(ramps if lag.origin != "identified" else split_recordings(tests, options, lag.seconds))
-    pooled = _in_order_of_pressure(pooled)
+    # What was read of all ramps together may fall together with the next test's by a hair.
+    pooled = sorted(pooled, key=lambda item: (nominal_dp(item.test) or 0.0, item.test.source))
     left_out = dict.fromkeys(part for item in pooled for part in item.left_out)
     for line in left_out_in_words(left_out, units_of(tests)):
         logger.info("%s", line)
@@ -223,8 +224,3 @@ def _describe(item: PooledTest, shapes: Iterator[BranchShape]) -> DescribedTest:
         files=item.files,
         left_out=item.left_out,
     )
-
-
-def _in_order_of_pressure(pooled: list[PooledTest]) -> list[PooledTest]:
-    """Sort by pressure drop; what was read of all ramps together may fall together with the next test's by a hair."""
-    return sorted(pooled, key=lambda item: (nominal_dp(item.test) or 0.0, item.test.source))
