@@ -230,29 +230,8 @@ def refuse_mixed_branches(described: Sequence[DescribedTest]) -> None:
         lacking = [item for item in described if item.shapes[column] is None]
         if not lacking or len(lacking) == len(described):
             continue
-        item, remedy = lacking[0], "record every pressure drop up and down, or leave that file out"
-        remedy = _pressure_on_its_way(item, column, described) or remedy
-        raise InputError(f"'{item.test.source}' has no {name} branch while other ramp tests have one; {remedy}")
-
-
-def _pressure_on_its_way(item: DescribedTest, column: int, described: Sequence[DescribedTest]) -> str | None:
-    """Return what to say where the branch that a test lacks was run at another pressure drop, in the same recording."""
-    other = next(
-        (
-            each
-            for each in described
-            if each is not item
-            and set(each.files) & set(item.files)
-            and each.shapes[column] is not None
-            and each.shapes[1 - column] is None
-        ),
-        None,
-    )
-    if other is None or other.dp is None or item.dp is None:
-        return None
-    source = next(file for file in item.files if file in other.files)[0]
-    return (
-        f"in '{source}' the pressure drop was {Shown(other.dp / MPA):.3g #MPa} on that branch, and "
-        f"{Shown(item.dp / MPA):.3g MPa} on the other one, so it is another test. Start the ramp after the pressure "
-        "has settled and record again, or leave that file out"
-    )
+        at = "" if lacking[0].dp is None else f" at {Shown(lacking[0].dp / MPA):.3g MPa}"
+        raise InputError(
+            f"'{lacking[0].test.source}' has no {name} branch{at} while other ramp tests have one; record every "
+            "pressure drop up and down, each ramp after the pressure has settled, or leave that file out"
+        )
