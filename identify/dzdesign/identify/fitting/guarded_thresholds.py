@@ -99,8 +99,8 @@ def guard_thresholds(group: DescribedTests, knees: Knees, options: IdentifyOptio
         names[each]: _by_ramps(group, knees, each, bound_threshold(group, knees, each, at_tests), at_tests)
         for each in columns
     }
-    if len(columns) > 1:
-        thresholds["mean"] = _mean_of(group, thresholds["opening"], thresholds["closing"])
+    if len(columns) > 1 and (mean := _mean_of(group, thresholds["opening"], thresholds["closing"])):
+        thresholds["mean"] = mean
     default = thresholds[names[column]]
     trend = find_trend(
         default.scatter(options), default.test, default.threshold.se,
@@ -269,9 +269,10 @@ def mean_threshold(group: DescribedTests, opening: Threshold, closing: Threshold
     )
 
 
-def _mean_of(group: DescribedTests, opening: GuardedThreshold, closing: GuardedThreshold) -> GuardedThreshold:
+def _mean_of(group: DescribedTests, opening: GuardedThreshold, closing: GuardedThreshold) -> GuardedThreshold | None:
     """Return the mean of both branches' thresholds: of each ramp that tells both, the mean of its two.
 
+    None where a test has no such ramp, as of branches that were recorded apart.
     Both branches of a ramp may share their errors, so the standard errors are averaged.
     """
     threshold = mean_threshold(group, opening.threshold, closing.threshold)
@@ -281,18 +282,8 @@ def _mean_of(group: DescribedTests, opening: GuardedThreshold, closing: GuardedT
     ).reshape(-1, 2).T  # fmt: skip
     up, down = opening.ramps, closing.ramps
     least_sd = max(opening.least_sd, closing.least_sd)
-    if set(closing.test[falling]) != set(closing.test):  # no ramp tells both branches: each test counts as one
-        rows = np.arange(threshold.value.size)
-        dp = np.zeros(rows.size)
-        dp[closing.test] = down.dp_MPa
-        ramps = Ramps(
-            dp_MPa=dp,
-            y=np.round(threshold.value, DECIMALS),
-            se=np.round(threshold.se, DECIMALS),
-            budget=_ceil(np.maximum(threshold.value - threshold.bound, 0.0)),
-        )
-        names = tuple(item.test.source for item in group.tests)
-        return GuardedThreshold(threshold=threshold, ramps=ramps, test=rows, sources=names, least_sd=least_sd)
+    if set(closing.test[falling]) != set(closing.test):
+        return None
     # The lag moves the branches against each other: of what both allow for it only their difference is left.
     shared = _floor(float(threshold.lag_budget.min()))
     credit = (opening.threshold.lag_budget + closing.threshold.lag_budget) / 2 - threshold.lag_budget
