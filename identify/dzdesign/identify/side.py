@@ -77,9 +77,8 @@ def identify_side(
     certified = _certify(group, guarding, reference, options)
     default = next(iter(certified.values()))
     model = _side_model(group, guarding, certified, knees, reference, options, units, low_flow)
-    departure = departures(
-        next(iter(guarding.thresholds.values())), guarding.trend.direction, default.one_way_p
-    )
+    one_way = next((each.lack_of_fit_p for each in default.curve.premises if each.premise == "monotone"), None)
+    departure = departures(next(iter(guarding.thresholds.values())), guarding.trend.direction, one_way)
     return SideIdentification(
         model=model,
         described=group,

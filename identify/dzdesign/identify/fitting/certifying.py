@@ -62,8 +62,6 @@ class Certified:
     curves: CurveClass
     scatter: Scatter
     refused: PremiseCheck | None
-    #: Probability of tests like these if the threshold ran one way; None where they can't tell.
-    one_way_p: float | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,15 +121,11 @@ def _certify(guarded: GuardedThreshold, tested: Tested, *, compared: bool) -> Ce
         known = premise != "smooth" or curvature is not None or scatter.model.knots_MPa.size >= FEWEST_FOR_BENDS
         if known and (compared or premise == PREMISE_OF[bounded.curves.kind]):
             checks.append(_checked(scatter, premise, curvature, tested))
-    one_way_p = None
-    if several and tested.direction != "flat":
-        one_way_p = lack_of_fit(scatter, curve="monotone", curvature=None, direction=WAYS[tested.direction])
     return Certified(
         curve=_curve(guarded, scatter, bounded, curvature, tuple(checks), tested),
         curves=bounded.curves,
         scatter=scatter,
         refused=refused,
-        one_way_p=one_way_p,
     )
 
 
