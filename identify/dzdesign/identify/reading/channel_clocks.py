@@ -23,8 +23,10 @@ ALIKE_SPANS = 0.1
 PAUSE = 3.0
 #: Rows at the end in which a column may be blank beside others, or show something again: they were written in part.
 LAST_ROWS, SHARE_OF_LAST = 2, 1e-3
-#: A gap before the last rows that is so many times as long as any other is a column's end.
-LONGER_GAP = 5
+#: Rows at the end of a flow that repeat one value, so many times as long as any before, within so many standard
+#: deviations of the readings before, which turn so often: the column was filled up. A gap before the last rows that is
+#: so many times as long as any other is its end.
+HELD, LONGER_HELD, NEAR_HELD, TURNS = 10, 5, 4.0, 3
 #: A channel that has no reading in more than this share of the command's rows is said in any case.
 LOST = 0.1
 logger = logging.getLogger(__name__)
@@ -145,11 +147,29 @@ def _refuse_another_time(
             )
 
 
+def _held_to_the_end(values: np.ndarray) -> int:
+    """Return how many rows at the end repeat one value, of a column whose readings scatter up to there; else 0.
+
+    A meter that jumps to zero below its floor does not scatter about what it repeats.
+    """
+    if not np.isfinite(values[-HELD:]).all() or values.size < 4 * HELD:
+        return 0
+    ends = np.flatnonzero(np.diff(values, append=np.nan) != 0)
+    runs = np.diff(ends, prepend=-1)
+    tail = int(runs[-1])
+    before = values[: values.size - tail][-HELD:]
+    if tail < HELD or tail < LONGER_HELD * runs[:-1].max(initial=1) or before.size < HELD:
+        return 0
+    near = abs(values[-1] - np.median(before)) <= NEAR_HELD * np.std(before)
+    turns = np.count_nonzero(np.diff(np.sign(np.diff(before))))
+    return tail if near and turns >= TURNS and np.isfinite(before).all() else 0
+
+
 def _last_before_a_gap(known: np.ndarray) -> int:
     """Return which of the rows with a reading is the last one, if those behind a gap unlike any other don't count."""
     gaps = np.diff(known)
     for behind in range(1, min(LAST_ROWS, gaps.size - 1) + 1):
-        if gaps[-behind] > LONGER_GAP * gaps[:-behind].max():
+        if gaps[-behind] > LONGER_HELD * gaps[:-behind].max():
             return known.size - 1 - behind
     return known.size - 1
 
@@ -158,9 +178,17 @@ def refuse_an_early_end(table: Table, found: Mapping[str, Column], data: Mapping
     """Refuse a column without a time of its own that is blank to the end while others go on.
 
     It may have been laid beside them from its first row on with another clock. One that a logger wrote in part in its
-    last row is none, nor one with a reading in every tenth row. A column that shows something once more in its last
-    rows, as of a final record, has ended as well.
+    last row is none, nor one with a reading in every tenth row. A flow that is filled up to the end has ended as well,
+    and so has a column that shows something once more in its last rows, as of a final record.
     """
+    flow = found["Q"]
+    for size in range(data["Q"].size, data["Q"].size - LAST_ROWS - 1, -1) if flow.clock is None else ():
+        if held := _held_to_the_end(data["Q"][:size]):
+            raise InputError(
+                f"'{table.path}' column '{flow.label}' repeats its last value to the last digit from "
+                f"{table.place(size - held)} on, {held} rows, as nowhere else, so it may have ended before the "
+                "others; export it with its own time, or cut these rows if the meter was switched off there"
+            )
     last = {}
     for quantity, column in found.items():
         known = np.flatnonzero(np.isfinite(data[quantity]))
