@@ -139,6 +139,14 @@ class TestHiddenZero:
         for test in next(iter(declared.sides.values())).tests:
             assert test.u_guard_lower_V < CLOSING
 
+    @pytest.mark.parametrize("noise", [0.003, 0.06, 0.18])
+    def test_readings_without_their_sign_fall_before_they_rise_and_noise_hides_it_from_single_ones_only(self, noise):
+        tests = [replace(test, q=np.abs(test.q)) for test in recordings(0.0, zero=-0.6, noise=noise)]
+        valve = identify(tests, OPTIONS)
+        assert warned(valve, "zero-hidden") and valve.positive.certificate.unseen_below_L_min > 1.1
+        honest = identify(recordings(0.0, zero=0.6, noise=min(noise, 0.12)), OPTIONS)
+        assert not warned(honest, "zero-hidden")
+
     def test_a_flow_allowed_at_zero_is_said_to_come_beside_it(self):
         valve = identify(self.cut_off(-0.6), replace(OPTIONS, zero_flow=0.3 * L_MIN))
         assert "beside a zero error" in valve.positive.zero_flow_in_words(valve.recorded_units)

@@ -35,7 +35,11 @@ EXPLAINED, LEAK_ERRORS = 0.5, 4.0
 HIDES_NOISE, HIDES_ALL = 0.6, 0.95
 LOW_FLOW, MIDDLE_FLOW, FEWEST_AT_FLOW = (0.02, 0.1), (0.3, 0.6), 40
 NOISE_OVER_STEP, NOISE_OVER_FLOW, NOISE_OVER_MIDDLE = 0.5, 5e-5, 0.2
-#: One meter has one zero: what more than a third of the recordings show counts.
+#: Readings below this share of those at rest, of which so many follow each other and differ, are of a flow that was
+#: below zero and lost its sign. They are means over the fewest of these numbers of rows whose noise at rest leaves so
+#: many standard deviations between the two.
+DIP, DIP_SIGMAS, FEWEST_DIPS, ROWS = 0.6, 5.0, 2, (1, 4, 9, 16, 25, 36)
+#: One meter has one zero: what more than a third of the recordings show counts. A steep ramp hides a dip.
 SHOWN_BY = 2 / 3
 #: Share of the readings up to twice a meter's floor that may lie below so much of it: with more it hides none.
 BELOW_FLOOR, OF_FLOOR = 0.1, 0.75
@@ -265,8 +269,8 @@ def hidden_zero(tests: Sequence[RampTest], floor: float, options: IdentifyOption
     """Return the largest zero error, m³/s, that readings at rest hide because the meter writes none below zero.
 
     At rest they are one number though the meter scatters where oil flows, so an error below zero does not show; it puts
-    every knee too high. 0 where they tell the zero, where it was declared, and where a floor hides them: the level at
-    which flow counts is above that.
+    every knee too high. So does one that lost its sign, whose readings fall before they rise. 0 where they tell the
+    zero, where it was declared, and where a floor hides them: the level at which flow counts is above that.
     """
     if options.meter_zero > 0:
         return 0.0
@@ -279,6 +283,8 @@ def hidden_zero(tests: Sequence[RampTest], floor: float, options: IdentifyOption
 def _hidden_in(test: RampTest, floor: float, largest: float, u_max: float) -> float | None:
     """Return the zero error that a recording hides, m³/s; None where it can't tell."""
     rest = test.q[readings_at_rest(test, u_max)]
+    if rest.size >= FEWEST_AT_REST and _is_a_magnitude(test.q, rest):
+        return 2 * median(rest)
     low = _noise_between(test.q, LOW_FLOW)
     if rest.size < FEWEST_AT_REST or low is None:
         return None
@@ -294,6 +300,24 @@ def _hidden_in(test: RampTest, floor: float, largest: float, u_max: float) -> fl
     if one < HIDES_NOISE or not scatters or has_floor:
         return 0.0
     return HIDDEN_ZERO * largest if one >= HIDES_ALL else min(2 * noise, HIDDEN_ZERO * largest)
+
+
+def _is_a_magnitude(q: np.ndarray, rest: np.ndarray) -> bool:
+    """Tell whether no reading is below zero, and those at rest are above others: a zero error below zero, turned up.
+
+    Where the valve opens such readings fall before they rise, through several values, unlike a drop-out.
+    """
+    if float(q.min()) < 0:
+        return False
+    for rows in ROWS:
+        if min(q.size, rest.size - FEWEST_AT_REST) < rows:
+            break
+        means, rests = (np.convolve(each, np.full(rows, 1 / rows), "valid") for each in (q, rest))
+        whole = np.convolve(q > 0, np.ones(rows), "valid") > rows - 0.5  # a drop-out is no dip, and no part of one
+        zero, dips = median(rests), (means < DIP * median(rests)) & whole
+        if (1 - DIP) * zero > DIP_SIGMAS * robust_sigma(rests) and float(rests.min()) >= DIP * zero:
+            return bool(np.count_nonzero(dips[1:] & dips[:-1] & (np.diff(means) != 0)) >= FEWEST_DIPS)
+    return False
 
 
 def _noise_between(q: np.ndarray, shares: tuple[float, float]) -> float | None:
