@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dzdesign.core.errors import InputError
 from dzdesign.identify.knees import linear_region as straight_part
 from dzdesign.identify.knees.prepared_tests import describe_tests
 from dzdesign.identify.knees.profile import crossing, flow_at_top, largest_flow, smooth_profile
@@ -107,17 +108,11 @@ class TestTables:
             test, time=np.arange(u.size, dtype=float), u=u, q=q * L_MIN, dp=np.full(u.size, 1e6), source="table.csv"
         )
 
-    def test_a_threshold_between_two_levels_is_known_to_one_level(self):
-        (test,) = identify([self.table()], DECLARED).positive.tests
-        assert test.u_knee_rising_V == pytest.approx(5.5, abs=0.4)
-        assert 0.2 <= test.u_knee_se_V <= 1.0
-        assert test.u_guard_lower_V < 5.2
+    def test_few_levels_tell_no_threshold(self):
+        with pytest.raises(InputError, match=r"only \d samples lie between 12% and 50% of the largest flow"):
+            identify([self.table()], DECLARED)
 
-    def test_and_the_gate_says_that_it_is_known_no_better(self):
-        codes = {warning.code for warning in identify([self.table()], DECLARED).warnings}
-        assert "coarse-levels" in codes
-
-    def test_finer_levels_need_no_chord(self):
+    def test_finer_levels_do(self):
         (test,) = identify([self.table(step=0.05)], DECLARED).positive.tests
         assert test.u_knee_rising_V == pytest.approx(5.5, abs=0.01)
         assert test.u_knee_se_V < 0.05

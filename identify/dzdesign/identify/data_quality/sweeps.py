@@ -107,13 +107,11 @@ def about_errors(
     """Yield a warning for each test whose knees are known badly, with the reason."""
     if all(test.u_knee_se_V <= NOISY * u_max for test in side.tests):
         return
-    left = _left_without_the_bend([shape for item in tests for shape in item.branches if _has_noise(shape)])
+    left = _left_without_the_bend([shape for item in tests for shape in item.branches])
     for test, group in zip(side.tests, (item.branches for item in tests), strict=True):
         if test.u_knee_se_V <= NOISY * u_max:
             continue
-        if not any(map(_has_noise, group)):
-            yield warn("coarse-levels", test.source, knee_se_mV=1e3 * test.u_knee_se_V)
-        elif left < BLAME:
+        if left < BLAME:
             yield _bent(test, left, window)
         else:
             alone = "; one branch alone can't tell noise from a bend of the flow, see --plots"
@@ -121,11 +119,6 @@ def about_errors(
                 "noise", test.source, knee_se_mV=1e3 * test.u_knee_se_V, noise_L_min=test.noise_L_min,
                 inflation=test.noise_variance_inflation, alone=alone if len(tests) == len(group) == 1 else "",
             )  # fmt: skip
-
-
-def _has_noise(shape: BranchShape) -> bool:
-    """Tell whether a line goes through noisy samples; one from level to level of a table has no residuals."""
-    return shape.line.roughness.n > 0
 
 
 def _left_without_the_bend(shapes: Sequence[BranchShape]) -> float:
