@@ -96,7 +96,7 @@ def spoil(path):
 CHANGES = {
     "the evidence": (lambda demo: spoil(demo / "evidence/verification.json"), "verification.json"),
     "a curve": (lambda demo: spoil(demo / "evidence/closed_loop_positive.csv"), "closed_loop_positive.csv"),
-    "a curve gone": (lambda demo: (demo / "evidence/input_map_positive.csv").unlink(), "input_map_positive.csv"),
+    "a curve gone": (lambda demo: (demo / "evidence/zero_command_positive.csv").unlink(), "zero_command_positive.csv"),
     "its manifest gone": (lambda demo: (demo / "evidence" / MANIFEST_NAME).unlink(), MANIFEST_NAME),
     "the firmware's manifest": (lambda demo: spoil(demo / "firmware" / MANIFEST_NAME), MANIFEST_NAME),
     "generated C": (lambda demo: spoil(demo / "firmware/core/dz_comp.c"), "dz_comp.c"),
