@@ -91,7 +91,7 @@ class FixedOffset:
     sign: int
     #: Over full drive.
     share: Fraction
-    #: Pressure drop, as the bench read it, at which the bound is lowest, MPa; of a lot that of the valve whose bound is.
+    #: Pressure drop as the bench read it at which the bound is lowest, MPa; of a lot that of the valve whose bound is.
     lowest_at_MPa: Fraction
     #: Interval of the pressure drop on which it is safe, MPa.
     dp_MPa: tuple[Fraction, Fraction]
