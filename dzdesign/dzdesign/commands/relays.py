@@ -206,7 +206,7 @@ RELAYS: Mapping[str, Relay] = {
             'dzdesign assess before/*.csv --after after/*.csv --limits "dead_zone_opening = 5 %"',
             "dzdesign assess before/*.csv --after after/*.csv --config dzdesign.toml",
         ),
-        "terminal.evidence_tables:print_assessment", _written, holds=_holds,
+        "terminal.brief:print_assessment", _written, holds=_holds,
     ),
     "simulate": Relay(
         "stages.simulate:SimulateArguments", "stages.simulate:simulate",

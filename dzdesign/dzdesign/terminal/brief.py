@@ -12,6 +12,8 @@ from dzdesign.terminal.progress import is_verbose
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from dzdesign.assess.assessment import Assessment, PressureAssessment
+    from dzdesign.assess.options import Set
     from dzdesign.core.recorded_units import RecordedUnits
     from dzdesign.design.compensator import Compensator
     from dzdesign.design.redesign import HysteresisChoice
@@ -26,6 +28,8 @@ if TYPE_CHECKING:
 LONGEST_WARNING = 76
 #: Lines that warnings take at most.
 MOST_WARNINGS = 4
+#: Limits that do not hold of which each has a line.
+MOST_MISSED = 3
 MORE = "More: -v, and `dzdesign explain CODE`."
 
 
@@ -202,7 +206,47 @@ def _put_choices(console: "Console", choices: "Sequence[HysteresisChoice]") -> N
             put_line(console, f"{each.given}: {each.possible}.")
 
 
-def warning_lines(warnings: "Iterable[Warning_]") -> Iterator[str]:
+def print_assessment(assessment: "Assessment") -> None:
+    """Print dead zone, hysteresis and flows without and with the compensator, and the limits that do not hold."""
+    if is_verbose():
+        evidence_tables.print_assessment(assessment)
+        return
+    console, units = new_console(), assessment.recorded_units
+    pressures = evidence_tables.shown_pressures(assessment) or assessment.pressures
+
+    def change(key: str, form: str) -> "Column[PressureAssessment]":
+        def shown(item: "PressureAssessment", name: "Set") -> str:
+            reading = item.readings(name).get(key)
+            known = None if reading is None else reading.at_most if reading.value is None else reading.value
+            if reading is None or known is None:
+                return "–"
+            number = units.number(known, form) if "L/min" in form else f"{known:{form}}"
+            return number if reading.value is not None else f"≤{number}"
+
+        return lambda item: f"{shown(item, 'before')} → {shown(item, 'after')}"
+
+    columns: dict[str, Column[PressureAssessment]] = {
+        "side": lambda item: item.side,
+        f"dP ({units.label('MPa')})": lambda item: (
+            "–" if item.dp_MPa is None else units.number(item.dp_MPa, ".2f MPa")
+        ),
+        "dead zone (%)": change("dead_zone_opening", ".1f"),
+        "hysteresis (%)": change("hysteresis", ".1f"),
+        f"flow at zero ({units.label('L/min')})": change("flow_at_zero", ".2f L/min"),
+        f"largest ({units.label('L/min')})": change("largest_flow", ".2f L/min"),
+    }
+    put_rows(console, "Without → with the compensator, on opening at the reading flow", pressures, columns)
+    if hidden := evidence_tables.not_observable(assessment):
+        put_line(console, f"not observable: {len(hidden)} kinds of reading, see -v")
+    *limits, verdict = evidence_tables.limit_lines(assessment)
+    missed = [line for line in limits if not line.startswith(f"{verdict_words(True)} ")]
+    for line in (*warning_lines(assessment.notes, "note"), *map(_shortened, missed[:MOST_MISSED]), verdict):
+        put_line(console, line)
+    tables.put_units(console, units, "assessment.json")
+    put_line(console, "More: -v, with every quantity.")
+
+
+def warning_lines(warnings: "Iterable[Warning_]", word: str = "warning") -> Iterator[str]:
     """Yield a line for each code, with how often it was raised; of many the last ones' codes share a line."""
     counts: dict[str, int] = {}
     first: dict[str, str] = {}
@@ -212,9 +256,9 @@ def warning_lines(warnings: "Iterable[Warning_]") -> Iterator[str]:
     times = {code: f" ({count})" if count > 1 else "" for code, count in counts.items()}
     shown = len(counts) if len(counts) <= MOST_WARNINGS else MOST_WARNINGS - 1
     for code in list(counts)[:shown]:
-        yield _shortened(f"warning [{code}]{times[code]} {first[code]}")
+        yield _shortened(f"{word} [{code}]{times[code]} {first[code]}")
     if rest := [code + times[code] for code in counts][shown:]:
-        yield f"further warnings: {', '.join(rest)}"
+        yield f"further {word}s: {', '.join(rest)}"
 
 
 def _shortened(text: str) -> str:
