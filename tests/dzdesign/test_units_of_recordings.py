@@ -234,8 +234,8 @@ def test_assess_prints_them(folder, ramps, tmp_path):
     after = [write_ramp(tmp_path, f"after_{n}.csv", 1.0, seed=40 + n) for n in (1, 2)]
     limits = "flow_at_zero = 0.001 L/min"
     output = tmp_path / "assessment.json"
-    words = ["-v", "assess", *ramps[:2], "--after", *after, "--columns", COLUMNS, *LAG, "--limits", limits, "-o", output]
-    status, text = run(*words)
+    words = ["assess", *ramps[:2], "--after", *after, "--columns", COLUMNS, *LAG, "--limits", limits, "-o", output]
+    status, text = run("-v", *words)
     assert status in (0, 1) and output.exists(), text
     assert not numbers_as_computed(text) and "10.0 bar" in text and "gpm/mA" in text
     document = json.loads(output.read_text(encoding="utf-8"))
