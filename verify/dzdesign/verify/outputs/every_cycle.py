@@ -86,17 +86,17 @@ def _grid(every: EveryPair) -> Grid:
     return Grid(commands=np.array(sorted(borders)), pressures=pressures)
 
 
-def _known(every: EveryPair, pressures: Mapping[str, np.ndarray], columns: np.ndarray | None = None) -> Known:
-    outputs = {place: every.outputs(law, pressures) for place, law in enumerate(every.laws)}
-    return Known(outputs=outputs, columns=columns)
+def _outputs(every: EveryPair, pressures: Mapping[str, np.ndarray]) -> dict[int, np.ndarray]:
+    return {place: every.outputs(law, pressures) for place, law in enumerate(every.laws)}
 
 
 def _from_counts(program: Program, every: EveryPair, grid: Grid, counts: Sequence[tuple[int, ...]]) -> Tried:
     """Try combinations of counts, with each side, rest and enable, at every command and pressure of a grid."""
-    known, found = _known(every, grid.pressures), Tried()
+    size = next(iter(grid.pressures.values())).size
+    known, found = Known(outputs=_outputs(every, grid.pressures), columns=np.arange(size)), Tried()
     enables = (True, False) if every.interlock else (True,)
     rows = np.array([(*state, enable, *each) for state, enable, each in product(every.states, enables, counts)])
-    at_once = max(every.at_once // (grid.commands.size * next(iter(grid.pressures.values())).size), 1)
+    at_once = max(every.at_once // (grid.commands.size * size), 1)
     for begin in range(0, len(rows), at_once):
         some = np.repeat(rows[begin : begin + at_once], grid.commands.size, axis=0)
         command = np.tile(grid.commands, some.shape[0] // grid.commands.size)[:, None]
@@ -141,7 +141,7 @@ def _in_sequences(program: Program, every: EveryPair, grid: Grid) -> tuple[Tried
     enabled = _Held(random, every.cycles, (0.9, 0.1))
     low, high = every.exact.commands
     command, columns = np.zeros(SEQUENCES, np.int64), np.zeros(SEQUENCES, np.int64)
-    outputs = _known(every, pools).outputs
+    outputs = _outputs(every, pools)
     first = {name: np.full(SEQUENCES, value) for name, value in every.first().items()}
     own, model = first, first
     found, returns, followed = Tried(), 0, np.ones(SEQUENCES, bool)

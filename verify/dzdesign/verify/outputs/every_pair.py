@@ -123,19 +123,18 @@ class Known:
 
     #: Of a side by its place: (commands, pressures), the last column of pressures that can't be right.
     outputs: Mapping[int, np.ndarray]
-    #: Column of each of the inputs' pressures; None: they are the columns, and each row has one command.
+    #: Column of each of the inputs' pressures; None: they are the columns in their order, those that can't be right are
+    #: the only ones that are not used, and each row has one command.
     columns: np.ndarray | None = None
 
     def at(self, place: int, towards: np.ndarray, held: np.ndarray) -> np.ndarray:
         """Return the outputs of a side at commands towards the driven one, of pressures that are used or `held`."""
         outputs = self.outputs[place]
         last, towards = outputs.shape[1] - 1, np.minimum(towards, len(outputs) - 1)
-        found: np.ndarray
-        if self.columns is not None:
-            found = outputs[towards, np.where(held, last, self.columns)]
+        if self.columns is None:
+            found: np.ndarray = outputs[towards[:, 0], :last]
         else:
-            rows = outputs[towards[:, 0]]
-            found = np.where(held, rows[:, last:], rows[:, :last])
+            found = outputs[towards, np.where(held, last, self.columns)]
         return found
 
 
