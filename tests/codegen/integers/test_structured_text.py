@@ -143,7 +143,8 @@ def test_the_debounce_time_is_the_least_whole_number_of_cycles_that_is_not_short
     """A number of samples is the time that they take at the firmware's rate, 1.25 kHz."""
     made = golden_compensator()
     functions = replace(made.drive_functions, fault_samples=5 if "samples" in asked else 1000)
-    made = replace(made, drive_functions=functions, options={"fault_debounce": asked})
+    target = target_named("f28335").inputs()
+    made = replace(made, drive_functions=functions, target=target, options={"fault_debounce": asked})
     assert interface_named("plc", made, cycle_time).fault_cycles == cycles_of(made, cycle_time) == cycles
     text = structured_text(made, DIGEST, "plc", cycle_time)
     assert (f"FAULT_CYCLES : DINT := {cycles};" in text) == ("enable : BOOL;" in text) == (cycles > 0)
