@@ -52,6 +52,20 @@ def line_in_beta(name: str, kappa: Fraction, u_min0_over_u_max: Fraction, n_adc:
 Codes = Annotated[int, Meta(ge=0, le=65535)]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LargestGain:
+    """The largest velocity gain of a position loop that comes to rest, at the test of a side where it is least."""
+
+    side: str
+    """Side of the valve."""
+    dp_MPa: Annotated[float, quantity("MPa")]
+    """Pressure drop of that test."""
+    gain: Annotated[float, quantity("1/s", ge=0)]
+    """Largest gain; 0 if the loop comes to rest at none."""
+    linear: Annotated[float, quantity("1/s", ge=0)]
+    """Gain at which the loop would swing with a valve without dead zone, play and transition."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Compensator(ShownInNotebooks, Artefact):
     """The law u_O = g(dP) u_i + o(dP) on converter codes with exact coefficients, as `dzdesign design` writes it."""
@@ -102,6 +116,9 @@ class Compensator(ShownInNotebooks, Artefact):
     supply, sensors, converter, oil or ageing."""
     costs: tuple[str, ...]
     """Cost of each safe choice, in words."""
+    position_loop: tuple[LargestGain, ...] | None = None
+    """Largest gain of a position loop for each side, with the lag and the delay of that option; null if it was not
+    computed."""
     valve: ValveModel
     """Identified valve from which the compensator was designed."""
     lot_sha256: str | None = field(init=False)

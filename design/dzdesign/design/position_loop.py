@@ -13,14 +13,14 @@ the next is exact, and piecewise affine in the states but for the instant at whi
 that lies above the threshold cycles at any gain: about zero the valve is never shut.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from math import atan, ceil, floor, hypot, inf, log10, pi
 
 import numpy as np
 from scipy.optimize import brentq
 
-from dzdesign.design.compensator import Compensator
+from dzdesign.design.compensator import Compensator, LargestGain
 from dzdesign.design.costs_at_tests import LawCorners, corners_of
 from dzdesign.design.design_choices import LOOP, read_position_loop
 
@@ -145,16 +145,6 @@ class _Loop:
         return area
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LargestGain:
-    """The largest velocity gain that comes to rest at the test where it is least, and that of an ideal line, 1/s."""
-
-    side: str
-    dp_MPa: float
-    gain: float
-    linear: float
-
-
 @cache
 def largest_gain(loop: Swinging, most: float = inf) -> float:
     """Return the largest velocity gain up to which the loop comes to rest, 1/s; 0 if it never does.
@@ -201,13 +191,26 @@ def largest_gains(compensator: Compensator, lag_s: float, delay_s: float) -> tup
     return tuple(found)
 
 
+def with_largest_gains(compensator: Compensator) -> Compensator:
+    """Return a compensator with the largest gain of each side in it, for the loop that its options state."""
+    return replace(compensator, position_loop=largest_gains(compensator, *_loop_of(compensator)))
+
+
+def _loop_of(compensator: Compensator) -> tuple[float, float]:
+    """Return lag and delay of the loop that the options of a compensator state, s."""
+    options = compensator.options or {}
+    return read_position_loop(options.get("position_loop") or LOOP, "--position-loop")[:2]
+
+
 def in_words(compensator: Compensator) -> list[str]:
     """Return what the largest gains are, a line each; nothing of a valve without a knee."""
-    options = compensator.options or {}
-    lag_s, delay_s, _ = read_position_loop(options.get("position_loop") or LOOP, "--position-loop")
+    lag_s, delay_s = _loop_of(compensator)
+    gains = compensator.position_loop
+    if gains is None:  # a lot's setting, which is no design of one valve
+        gains = largest_gains(compensator, lag_s, delay_s)
     units = compensator.valve.recorded_units
     lines = []
-    for each in largest_gains(compensator, lag_s, delay_s):
+    for each in gains:
         at = units.text(each.dp_MPa, ".2f MPa")
         lines.append(
             f"position loop (P) around the {each.side} side, lag {1e3 * lag_s:g} ms, delay {1e3 * delay_s:g} ms: it "

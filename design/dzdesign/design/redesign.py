@@ -78,7 +78,8 @@ def prove_derived(compensator: Compensator) -> None:
             raise InputError(f"{error}; make it again with `dzdesign batch`") from error
         _prove_lot_setting(compensator, redesigned)
         redesigned = replace(redesigned, sides=sides, lot=compensator.lot, costs=compensator.costs)
-    redesigned = replace(redesigned, tool=compensator.tool)
+    # The position loop is said beside the law, which does not rest on it.
+    redesigned = replace(redesigned, tool=compensator.tool, position_loop=compensator.position_loop)
     for found in differences(compensator, redesigned):
         raise InputError(
             f"'{found.place}' is {_words(found.stated)}, but {_words(found.follows)} follows from its valve and its "

@@ -95,6 +95,7 @@ def design(arguments: DesignArguments) -> "Compensator":
     from dzdesign.core.artefact_types import to_json_bytes
     from dzdesign.design.compensator import SCHEMA
     from dzdesign.design.designing import design as design_valve
+    from dzdesign.design.position_loop import with_largest_gains
     from dzdesign.identify.valve.model import ValveModel
 
     design_options(arguments, arguments.target, both_sides=True)  # a wrong option is refused before a wrong file
@@ -104,7 +105,7 @@ def design(arguments: DesignArguments) -> "Compensator":
     if not isinstance(valve, ValveModel):
         valve = read_artefact(read_bytes(Path(valve), "valve file"), ValveModel, os.fspath(valve))
     options = design_options(arguments, arguments.target, both_sides=len(valve.sides) > 1)
-    compensator = design_valve(valve, options)
+    compensator = with_largest_gains(design_valve(valve, options))
     if arguments.output is not None:
         write_file(Path(arguments.output), to_json_bytes(compensator), SCHEMA)
     return compensator

@@ -197,6 +197,17 @@ def test_above_the_tests_the_bound_falls_faster_and_faster(curve):
     assert np.all(above.bound < SHAPES["line"](above.dp_MPa))
 
 
+@pytest.mark.parametrize("curve", [None, "line"])
+def test_above_the_tests_the_bound_goes_on_from_the_last_one(curve):
+    """With an error probability of its own it lay 372 mV lower at once, of three pressures with two ramps each."""
+    ramps = ramps_of("line", pressures=3, repeats=2)
+    scatter = scatter_of(ramps)
+    found = certify(scatter, find_class(scatter, curve=curve, curvature=None))
+    above = continue_above(scatter, found)
+    assert above.bound[0] == pytest.approx(found.bound[-1], abs=1e-6)
+    assert above.bound[1] > found.bound[-1] - 0.04
+
+
 def test_a_direction_that_is_not_known_is_the_worse_of_both():
     scatter = scatter_of(ramps_of("line"))
     bounds = {

@@ -24,9 +24,9 @@ from dzdesign.identify.fit.curve_class import CurveClass, Kind, one_way
 from dzdesign.identify.fit.ramp_model import broken_line
 from dzdesign.identify.fit.scatter import Scatter
 
-#: Shares of the error probability, 1 % by default, of the roofs and of the bound above the tests; and what is kept for
-#: the rule of the bends. The floors have the rest: all of it where only the tests themselves are certified.
-ROOFS, ABOVE, OF_BENDS = 0.05, 0.05, 0.2
+#: Shares of the error probability, 1 % by default, of the roofs, and what is kept for the rule of the bends. The floors
+#: have the rest: all of it where only the tests themselves are certified.
+ROOFS, OF_BENDS = 0.05, 0.2
 DRAWS, SEED = 40_000, 20240
 #: Neighbouring draws that count as one where the scatter's error is integrated.
 TOGETHER = 8
@@ -47,7 +47,7 @@ SOLVERS: tuple[tuple[str, dict[str, float]], ...] = (
 ROUNDING_V = 1.5e-7
 #: Above the tests: the first node over the last pressure drop, each over the one before, the last one.
 FIRST_STEP, STEP, FURTHEST = 1.05, 1.1, 16.0
-#: Times the last pressure drop at which the test that gives the slope is chosen.
+#: Times the last pressure drop at which the chord above the tests is chosen, and a straight line through all is bounded.
 CHOSEN_AT = 2.0
 
 
@@ -129,17 +129,31 @@ def certify(scatter: Scatter, curves: CurveClass, *, confidence: float = 0.99) -
     return Certificate(curves=curves, data=data, bound=bound, criticals=criticals, proofs=tuple(proofs))
 
 
-def largest_offsets(curves: CurveClass, data: DataSet) -> Proof:
-    """Return the largest safe offset at every grid point and the multipliers that prove it."""
+def largest_offsets(curves: CurveClass, data: DataSet, sums: np.ndarray | None = None) -> Proof:
+    """Return the largest safe offset at every grid point, or the least of other sums of g, and what proves it.
+
+    Parameters
+    ----------
+    curves, data
+        What is known of g on the grid (N,).
+    sums
+        Weights (T, N) of the sums; e(p) of each grid point where none are given.
+
+    Raises
+    ------
+    NoCurveAgreesError
+        If no threshold of the class agrees with the data.
+    """
     from scipy.optimize import linprog
     from scipy.sparse import csr_array, eye_array, kron
 
     left, right, _ = _from_common_zero(curves, data)
-    count = curves.grid_MPa.size
+    sums = np.eye(curves.grid_MPa.size) if sums is None else sums
+    count = len(sums)
     # The programmes of all points at once: the solver is called once in place of thirty times.
-    every, points = kron(eye_array(count), csr_array(left.T), format="csr"), np.eye(count).ravel()
+    every = kron(eye_array(count), csr_array(left.T), format="csr")
     for method, options in SOLVERS:
-        solved = linprog(-np.tile(right, count), A_eq=every, b_eq=points, method=method, options=options)
+        solved = linprog(-np.tile(right, count), A_eq=every, b_eq=sums.ravel(), method=method, options=options)
         if solved.status == 0:
             break
     else:
@@ -149,13 +163,15 @@ def largest_offsets(curves: CurveClass, data: DataSet) -> Proof:
         )
     # Rows that hold with equality, or that the solver used.
     slack, used = (each.reshape(count, -1) for each in (np.abs(solved.lower.marginals), solved.x))
-    return prove(curves, data, [np.flatnonzero(row) for row in (used > SMALLEST) | (slack < SLACK)])
+    return prove(curves, data, [np.flatnonzero(row) for row in (used > SMALLEST) | (slack < SLACK)], sums)
 
 
-def prove(curves: CurveClass, data: DataSet, rows: Sequence[np.ndarray]) -> Proof:
+def prove(
+    curves: CurveClass, data: DataSet, rows: Sequence[np.ndarray], sums: np.ndarray | None = None
+) -> Proof:
     """Return the offset that some rows of what is known prove at each grid point, with exact multipliers.
 
-    They are those of `known_rows`.
+    They are those of `known_rows`; other sums (T, N) of g than its values are proved alike.
 
     Raises
     ------
@@ -166,7 +182,8 @@ def prove(curves: CurveClass, data: DataSet, rows: Sequence[np.ndarray]) -> Proo
 
     left, _, _ = _from_common_zero(curves, data)
     kept, multipliers = [], []
-    for point, of_point in zip(np.eye(len(rows)), rows, strict=True):
+    sums = np.eye(len(rows)) if sums is None else sums
+    for point, of_point in zip(sums, rows, strict=True):
         found = np.zeros(of_point.size)
         if of_point.size:
             with suppress(RuntimeError):  # of many equal rows it may go round: then they prove nothing, which is said
@@ -175,15 +192,16 @@ def prove(curves: CurveClass, data: DataSet, rows: Sequence[np.ndarray]) -> Proo
         kept.append(of_point[used])
         multipliers.append(found[used])
     return Proof(
-        state=data.state, direction=curves.direction, offsets=proved_offsets(curves, data, kept, multipliers),
+        state=data.state, direction=curves.direction, offsets=proved_offsets(curves, data, kept, multipliers, sums),
         rows=tuple(kept), multipliers=tuple(multipliers),
     )  # fmt: skip
 
 
 def proved_offsets(
-    curves: CurveClass, data: DataSet, rows: Sequence[np.ndarray], multipliers: Sequence[np.ndarray]
+    curves: CurveClass, data: DataSet, rows: Sequence[np.ndarray], multipliers: Sequence[np.ndarray],
+    sums: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Return the offset that multipliers of some rows prove at each grid point, V: sums, and no solver.
+    """Return the offset that multipliers of some rows prove at each grid point, V: additions, and no solver.
 
     What A'l lacks of e(p), of rounding, counts with what thresholds differ by.
 
@@ -196,14 +214,13 @@ def proved_offsets(
     # No threshold of the class lies further from the common zero than this.
     highest = data.roof if np.isfinite(data.roof).all() else data.floor
     largest = 2 * float(highest.max() - data.floor.min())
+    sums = np.eye(len(rows)) if sums is None else sums
     offsets = np.empty(len(rows))
-    for at, (of_point, found) in enumerate(zip(rows, multipliers, strict=True)):
-        point = np.zeros(left.shape[1])
-        point[at] = 1.0
+    for at, (point, of_point, found) in enumerate(zip(sums, rows, multipliers, strict=True)):
         left_over = float(np.sum(np.abs(found @ left[of_point] - point)))
         if not left_over <= PROOF or np.any(found < 0):
             raise InputError(f"the multipliers of a certified bound miss their proof by {left_over:.1g}")
-        offsets[at] = base + float(right[of_point] @ found) / 1e3 - left_over * largest
+        offsets[at] = base * point.sum() + float(right[of_point] @ found) / 1e3 - left_over * largest
     return offsets
 
 
@@ -241,8 +258,9 @@ def running_minimum(bound: np.ndarray, direction: int) -> np.ndarray:
 def contrasts(scatter: Scatter, state: float) -> np.ndarray:
     """Return weights (J, n) of the ramps, each with the sum 1, in a valve of that state.
 
-    Knots first; then averages of three neighbours and a straight line at both ends and the middle, which bound curves
-    that bend little more sharply. Where a knot scatters unlike the others they would mix two variances, and stay out.
+    Knots first; then averages of three neighbours and a straight line at both ends, the middle and above the tests,
+    which bound curves that bend little more sharply. Where a knot scatters unlike the others they would mix two
+    variances, and stay out.
     """
     model = scatter.model
     count, dp = model.knots_MPa.size, model.ramps.dp_MPa
@@ -250,7 +268,7 @@ def contrasts(scatter: Scatter, state: float) -> np.ndarray:
     if count == 1 or scatter.unlike is not None:
         return rows[0]
     rows += [rows[0][at - 1 : at + 2].mean(axis=0, keepdims=True) for at in range(1, count - 1)]
-    rows.append(line_at(scatter, np.array([dp.min(), dp.mean(), dp.max()]), state))
+    rows.append(line_at(scatter, np.array([dp.min(), dp.mean(), dp.max(), CHOSEN_AT * dp.max()]), state))
     every = np.vstack(rows)
     # Of two tests the line's ends are the tests themselves: which of two equal rows proves a bound is no one's choice.
     new = [not np.any(np.all(np.abs(every[:row] - every[row]) < SMALLEST, axis=1)) for row in range(len(every))]
@@ -276,7 +294,7 @@ def find_criticals(scatter: Scatter, kind: Kind, error: float) -> Criticals:
     # Of tests alone the sums that mix them would only cost.
     weights = [contrasts(scatter, state)[: scatter.model.knots_MPa.size if alone else None]
                for state in states_of(scatter)]  # fmt: skip
-    floors = 1.0 if alone else 1 - ROOFS - ABOVE - (OF_BENDS if kind == "bends" else 0.0)
+    floors = 1.0 if alone else 1 - ROOFS - (OF_BENDS if kind == "bends" else 0.0)
     parts = 1 if unlike is None else 2
 
     def value(rows: np.ndarray, degrees: float, share: float, of_error: float) -> float:
@@ -377,13 +395,12 @@ class AboveBound:
     certified: bool = True
 
 
-def continue_above(scatter: Scatter, certificate: Certificate, *, confidence: float = 0.99) -> AboveBound | None:
+def continue_above(scatter: Scatter, certificate: Certificate) -> AboveBound | None:
     """Continue the bound above the last test; None where nothing is known between the tests either.
 
     A threshold that rises, as far as is known, stays; one that may fall goes on with the steepest slope between two
     tests, and nothing is certified. A line goes on; a curve that bends by at most M lies at most M/2 (x - a)(x - b)
-    below the chord of two tests a < b, b the last. Of all tests that one gives the slope which leaves the largest
-    bound, by their errors and M alone.
+    below the chord of two tests a < b, b the last. Of all tests a that one is taken which leaves the largest bound.
     """
     curves, model = certificate.curves, scatter.model
     knots = model.knots_MPa
@@ -400,18 +417,32 @@ def continue_above(scatter: Scatter, certificate: Certificate, *, confidence: fl
         return AboveBound(
             dp_MPa=nodes, bound=certificate.bound[-1] + slope * (nodes - last), certified=rises
         )
-    found = []
-    for start in range(knots.size - 1):
-        band, value = _band_above(scatter, curves, start, nodes, confidence)
-        # Between two tests and beyond them it bends no more than in the outermost interval and those that count.
-        sag = _bend_above(curves, knots, start) / 2 * (nodes - last) * (nodes - knots[start])
-        taken_off = float(np.interp(CHOSEN_AT * last, nodes, band + sag))
-        found.append((taken_off, start, value - band - sag))
-        if curves.kind == "line":
-            break
-    bound = min(found, key=lambda each: each[:2])[2]
+    # A line is the same, whichever tests it is taken from.
+    starts = range(1 if curves.kind == "line" else knots.size - 1)
+    chosen = max(starts, key=lambda start: float(_least_above(certificate, knots, start, CHOSEN_AT * nodes[:1])[0]))
+    bound = _least_above(certificate, knots, chosen, nodes)
     # It is concave, so chords between the nodes lie below it; and it never says more than the last test's own bound.
     return AboveBound(dp_MPa=nodes, bound=np.minimum.accumulate(np.minimum(bound, certificate.bound[-1])))
+
+
+def _least_above(certificate: Certificate, knots_MPa: np.ndarray, start: int, dp_MPa: np.ndarray) -> np.ndarray:
+    """Return the least threshold, V, at pressure drops (T,) above the tests, on the chord of a knot and the last one.
+
+    The class and the data bound both ends and their difference: it is one more sum in the programme of the tests.
+    """
+    curves = certificate.curves
+    grid = curves.grid_MPa
+    at = int(np.abs(grid[:-1] - knots_MPa[start]).argmin())
+    beyond = ((dp_MPa - grid[-1]) / (grid[-1] - grid[at]))[:, None]
+    chord = (1 + beyond) * np.eye(grid.size)[-1] - beyond * np.eye(grid.size)[at]
+    least = np.full(dp_MPa.size, np.inf)
+    for each in one_way(curves):
+        for known in certificate.data:
+            with suppress(NoCurveAgreesError):  # as in `certify`, which has refused what no direction allows
+                least = np.minimum(least, largest_offsets(each, known, chord).offsets)
+    # Between two tests and beyond them it bends no more than in the outermost interval and those that count.
+    sag: np.ndarray = _bend_above(curves, knots_MPa, start) / 2 * (dp_MPa - grid[-1]) * (dp_MPa - grid[at])
+    return least - sag
 
 
 def _bend_above(curves: CurveClass, knots_MPa: np.ndarray, start: int) -> float:
@@ -426,30 +457,3 @@ def _bend_above(curves: CurveClass, knots_MPa: np.ndarray, start: int) -> float:
     changes, gaps = np.pad(curves.change.max(axis=0), 1), np.diff(knots_MPa)
     found = 4 * np.maximum(changes[:-1], changes[1:]) / gaps
     return float(found[start:].max())
-
-
-def _band_above(
-    scatter: Scatter, curves: CurveClass, start: int, nodes: np.ndarray, confidence: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return by what errors take off the threshold continued to the nodes, and that, V: the least of all states."""
-    model = scatter.model
-    ramps = model.ramps
-    share = ((nodes - nodes[0]) / (model.knots_MPa[-1] - model.knots_MPa[start]))[:, None]
-    by_state = []
-    for state in states_of(scatter):
-        if curves.kind == "line":
-            by_state.append(line_at(scatter, nodes, state))
-            continue
-        rows = model.at_knots(state)
-        by_state.append(rows[-1] + share * (rows[-1] - rows[start]))
-    tail = ABOVE * (1 - confidence)
-    degrees = min(scatter.degrees, scatter.unlike.degrees) if scatter.unlike else scatter.degrees
-    variances = scatter.of_ramps
-    factor = critical(np.vstack(by_state) * np.sqrt(variances / scatter.variance), degrees, scatter.share, tail)
-    most = scatter.variance if scatter.unlike is None else max(scatter.unlike.variance, scatter.variance)
-    lows = []
-    for each in by_state:
-        error = factor * np.sqrt(scatter.share * most + each**2 @ variances)
-        lows.append(each @ ramps.y - error - np.abs(each) @ ramps.budgets - ramps.shared)
-    value = by_state[0] @ ramps.y
-    return value - np.min(lows, axis=0), value

@@ -258,7 +258,7 @@ def _above(scatter: Scatter, bounded: _Bounded, tested: Tested) -> AboveTests | 
     """Continue the bound above the last test, up to the first node where it says nothing any more."""
     if not tested.with_dp or tested.dp_MPa.size < 2:
         return None
-    above = continue_above(scatter, bounded.certificate, confidence=tested.options.confidence)
+    above = continue_above(scatter, bounded.certificate)
     if above is None:
         return None
     lower = np.floor(np.minimum(above.bound, bounded.bound[-1]) * 10**DECIMALS) / 10**DECIMALS
