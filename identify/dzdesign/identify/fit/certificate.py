@@ -47,7 +47,7 @@ SOLVERS: tuple[tuple[str, dict[str, float]], ...] = (
 ROUNDING_V = 1.5e-7
 #: Above the tests: the first node over the last pressure drop, each over the one before, the last one.
 FIRST_STEP, STEP, FURTHEST = 1.05, 1.1, 16.0
-#: Times the last pressure drop at which the chord above the tests is chosen, and a straight line through all is bounded.
+#: Times the last pressure drop at which the chord above the tests is chosen, and a line through all ramps is bounded.
 CHOSEN_AT = 2.0
 
 
@@ -435,14 +435,14 @@ def _least_above(certificate: Certificate, knots_MPa: np.ndarray, start: int, dp
     at = int(np.abs(grid[:-1] - knots_MPa[start]).argmin())
     beyond = ((dp_MPa - grid[-1]) / (grid[-1] - grid[at]))[:, None]
     chord = (1 + beyond) * np.eye(grid.size)[-1] - beyond * np.eye(grid.size)[at]
-    least = np.full(dp_MPa.size, np.inf)
+    least: np.ndarray = np.full(dp_MPa.size, np.inf)
     for each in one_way(curves):
         for known in certificate.data:
             with suppress(NoCurveAgreesError):  # as in `certify`, which has refused what no direction allows
                 least = np.minimum(least, largest_offsets(each, known, chord).offsets)
     # Between two tests and beyond them it bends no more than in the outermost interval and those that count.
-    sag: np.ndarray = _bend_above(curves, knots_MPa, start) / 2 * (dp_MPa - grid[-1]) * (dp_MPa - grid[at])
-    return least - sag
+    least -= _bend_above(curves, knots_MPa, start) / 2 * (dp_MPa - grid[-1]) * (dp_MPa - grid[at])
+    return least
 
 
 def _bend_above(curves: CurveClass, knots_MPa: np.ndarray, start: int) -> float:
