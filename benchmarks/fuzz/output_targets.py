@@ -25,7 +25,7 @@ TESTS = Path(__file__).parents[2] / "tests"
 CODES = np.array([[0, 0, 0], [2048, 900, 600], [4095, 4095, 0], [65535, 1, 65535]])
 NUMBERS = np.array([0, 1, -1, 5000, -(2**31), 2**31 - 1], dtype=np.int32)
 REFUSALS = (RequirementError, ValueError)
-BLOCK_SETTINGS = {"interface": "plc", "dialect": "twincat"}
+BLOCK_SETTINGS = {"interface": "plc", "dialect": "twincat", "cycle_time": ""}
 
 
 @cache

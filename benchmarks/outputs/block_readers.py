@@ -24,7 +24,7 @@ NAME, ROOTS = "FB_DeadZone", ("goldens", "goldens_full")
 def texts(root: str, dialect: str, interface: str) -> dict[str, str]:
     """Return the text of each file of an output that a PLC's tool reads."""
     compensator = golden_compensator(root=ROOT / "tests" / root)
-    settings = {"dialect": dialect, "interface": interface}
+    settings = {"dialect": dialect, "interface": interface, "cycle_time": "1 ms"}
     files = generate_output(compensator, "iec61131", settings).files
     found = {f"{NAME}.st": files[f"{NAME}.st"].decode()}
     parts = {each.tag.rpartition("}")[2]: each for each in ElementTree.fromstring(files[f"{NAME}.xml"]).iter()}

@@ -447,9 +447,16 @@ SETS = ("before_*.csv", "--after", "after_*.csv", "--meter-lag", "0 s")
 
 def run(capsys, *argv):
     """Run assess and return its status, stdout and stderr."""
-    status = main(["assess", *argv])
+    status = main(["-v", "assess", *argv])
     out, err = capsys.readouterr()
     return status, out, err
+
+
+def test_the_command_fits_one_screen(bench, capsys):
+    assert main(["assess", *SETS, "--limits", "hysteresis = 0.1 %, dead_zone_opening = 0.1 %"]) == 1
+    out = capsys.readouterr().out
+    assert len([row for line in out.splitlines() for row in textwrap.wrap(line, 78)]) <= 24
+    assert "DOES NOT HOLD  dead zone" in out and "4 of 4 limits" in out
 
 
 def test_the_command_prints_tables_formulas_and_writes_the_artefact(bench, capsys):

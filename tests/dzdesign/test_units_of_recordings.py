@@ -235,7 +235,7 @@ def test_assess_prints_them(folder, ramps, tmp_path):
     limits = "flow_at_zero = 0.001 L/min"
     output = tmp_path / "assessment.json"
     words = ["assess", *ramps[:2], "--after", *after, "--columns", COLUMNS, *LAG, "--limits", limits, "-o", output]
-    status, text = run(*words)
+    status, text = run("-v", *words)
     assert status in (0, 1) and output.exists(), text
     assert not numbers_as_computed(text) and "10.0 bar" in text and "gpm/mA" in text
     document = json.loads(output.read_text(encoding="utf-8"))

@@ -36,7 +36,7 @@ def copied(reported_demo, tmp_path):
 
 def test_every_folder_of_a_valve_leads_to_the_same_artefacts(copied):
     chain = read_chain(copied)
-    assert chain.missing == () and len(chain.curves) == 3
+    assert chain.missing == () and len(chain.curves) == 2
     assert chain.places == read_chain(copied / "evidence").places == read_chain(copied / "firmware").places
     files = {"evidence": "evidence/verification.json", "firmware": f"firmware/{MANIFEST_NAME}",
              "compensator": "firmware/compensator.json", "valve": "valve.json"}  # fmt: skip
@@ -96,7 +96,7 @@ def spoil(path):
 CHANGES = {
     "the evidence": (lambda demo: spoil(demo / "evidence/verification.json"), "verification.json"),
     "a curve": (lambda demo: spoil(demo / "evidence/closed_loop_positive.csv"), "closed_loop_positive.csv"),
-    "a curve gone": (lambda demo: (demo / "evidence/input_map_positive.csv").unlink(), "input_map_positive.csv"),
+    "a curve gone": (lambda demo: (demo / "evidence/zero_command_positive.csv").unlink(), "zero_command_positive.csv"),
     "its manifest gone": (lambda demo: (demo / "evidence" / MANIFEST_NAME).unlink(), MANIFEST_NAME),
     "the firmware's manifest": (lambda demo: spoil(demo / "firmware" / MANIFEST_NAME), MANIFEST_NAME),
     "generated C": (lambda demo: spoil(demo / "firmware/core/dz_comp.c"), "dz_comp.c"),

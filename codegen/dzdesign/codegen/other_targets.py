@@ -47,7 +47,7 @@ OTHER_TARGETS: Mapping[str, OtherTarget] = {
             name="iec61131",
             description="Structured Text of IEC 61131-3: a function block for a PLC, and PLCopen XML",
             module="dzdesign.codegen.integers.plc",
-            options={"dialect": ("codesys", "twincat"), "interface": ("plc", "codes")},
+            options={"dialect": ("codesys", "twincat"), "interface": ("plc", "codes"), "cycle_time": ()},
             folder="plc",
         ),
         OtherTarget(

@@ -15,7 +15,7 @@ from dzdesign.design.current.circuit import CoilCircuit, CurrentSensor
 from dzdesign.design.current.drive import OVER_SHARE
 from dzdesign.design.current.responses import CurrentRequest
 from dzdesign.design.design_choices import DIGITS, read_error
-from dzdesign.design.machine import COPPER_PER_K, REFERENCE_C, DriveKind, Machine
+from dzdesign.design.machine import REFERENCE_C, DriveKind, Machine
 from dzdesign.design.signal_text import PinSignal, parse_signal
 from dzdesign.design.signals import PressureSignal, Signals
 from dzdesign.design.target_inputs import TargetInputs
@@ -23,6 +23,8 @@ from dzdesign.design.target_inputs import TargetInputs
 #: Options that only current control has a use for, and those that it needs.
 OF_CURRENT = ("coil", "rated_current", "current_signal", "supply_signal", "current_error", "bench_current")
 NEEDED = ("coil", "rated_current", "supply", "current_signal")
+#: Options that a controlled current leaves without effect.
+OF_VOLTAGE = ("coil_temperature", "bench_coil", "bench_supply")
 #: Behind the signal of the current: each of two solenoids has a shunt.
 EACH = " each"
 #: Of the ends of a sensor's range: that of the decimal numbers in them.
@@ -50,6 +52,12 @@ def current_request(
         return None
     if target.current_sampling is None:
         raise InputError(f"the files of target {target.name} sample no current; give --drive duty, or another --target")
+    if useless := [flag_of(name) for name in OF_VOLTAGE if text[name]]:
+        raise InputError(
+            f"{useless[0]} has no effect with --drive current, as the current loop is designed for the range of "
+            "resistance in --coil; take it out, and state there what the temperatures make of it, such as '3.5 ohm x "
+            "0.84..1.24, 40 mH' for -20 to 80 degC"
+        )
     if missing := [flag_of(name) for name in NEEDED if not text[name]]:
         raise InputError(
             f"--drive current needs {', '.join(missing)}; write for example --coil '3.5 ohm 40 mH' --rated-current "
@@ -69,10 +77,11 @@ def current_request(
         )
     sensor = parse_signal(text["current_signal"].removesuffix(EACH), "--current-signal")
     sensor.check_within(target.converter)
-    _check_measured(sensor, "--current-signal", "A", OVER_SHARE * circuit.rated_A)
+    over = f", {OVER_SHARE:g} times the rated current, where the over-current fault trips"
+    _check_measured(sensor, "--current-signal", "A", OVER_SHARE * circuit.rated_A, over)
     supply = parse_signal(text["supply_signal"], "--supply-signal") if text["supply_signal"] else None
     if supply is not None:
-        _check_measured(supply, "--supply-signal", "V", circuit.supply_V[1])
+        _check_measured(supply, "--supply-signal", "V", circuit.supply_V[1], ", the highest --supply")
     return CurrentRequest(
         circuit=circuit,
         sensor=CurrentSensor(
@@ -87,7 +96,7 @@ def current_request(
     )
 
 
-def _check_measured(signal: PinSignal, option: str, unit: str, needed: float) -> None:
+def _check_measured(signal: PinSignal, option: str, unit: str, needed: float, which: str) -> None:
     """Refuse a signal of another quantity, one that stands for something else, and one that ends too low."""
     if signal.unit != unit or signal.meaning is not None:
         example = "'0..1.2 A on 2 ohm + 0.15 V'" if unit == "A" else "'0..36 V x 0.075'"
@@ -97,7 +106,7 @@ def _check_measured(signal: PinSignal, option: str, unit: str, needed: float) ->
     if float(signal.high) < needed * (1 - ROUNDING):
         raise InputError(
             f"{option} is {quoted(signal.text)}, which ends at {float(signal.high):g} {unit}, expected {needed:g} "
-            f"{unit} or more: beyond its end a sensor tells nothing"
+            f"{unit} or more{which}"
         )
 
 
@@ -135,7 +144,6 @@ def machine_of(
         keys.values["amplifier_error"] = read["amplifier"]
     if current is not None:
         _take_current(keys, text, read, current)
-        _check_coil(keys.values, current, text)
     _take_pressures(keys, text, read, sensors, target)
     keys.take("oil_error", read["oil"], DEFAULT_OIL, "0.2 %, the paper's Fig. 22")
     keys.take("ageing_error", read["ageing"], DEFAULT_AGEING, "0.5 %, a convention that no recording shows")
@@ -214,21 +222,6 @@ def _take_current(keys: _Keys, text: Mapping[str, str], read: Mapping[str, Any],
         keys.values["bench_full_A"] = round(ampere, DIGITS)
     share = None if ampere is None or error is None else round(error / ampere, DIGITS)
     keys.take("bench_current_error", share, DEFAULT_BENCH_CURRENT, "1 % of the bench's current at a command")
-
-
-def _check_coil(keys: Mapping[str, Any], current: CurrentRequest, text: Mapping[str, str]) -> None:
-    """Refuse temperatures at which the coil leaves the range of resistance that the current loop is designed for."""
-    if "coil_temperature_C" not in keys:
-        return
-    coldest, hottest = (
-        float(1 + COPPER_PER_K * Fraction(each - keys["bench_coil_C"])) for each in keys["coil_temperature_C"]
-    )
-    low, high = current.circuit.resistance_factors
-    if coldest < low or hottest > high:
-        raise InputError(
-            f"--coil-temperature '{text['coil_temperature']}' makes the coil's resistance x {coldest:.3f} to "
-            f"x {hottest:.3f}, beyond --coil's x {low:g}..{high:g}; widen that range, or narrow the temperatures"
-        )
 
 
 def _take_pressures(

@@ -201,14 +201,15 @@ class DesignChoices:
     rated_current: Annotated[Text, Option("I", DRIVE, example="1 A", read=quantity("current"))] = None
     """Current at full drive, for --drive current."""
     current_signal: Annotated[Text, Option("S", DRIVE, example="0..1.2 A on 2 ohm + 0.15 V")] = None
-    """Signal of the current sensor at the converter, for --drive current, such as "0..1.2 A on 2 ohm + 0.15 V". The
-    resistance is that of the shunt times its amplifier's gain, and the voltage is the one without current."""
+    """Signal of the current sensor at the converter, for --drive current, such as "0..1.2 A on 2 ohm + 0.15 V". It ends
+    at 1.2 times the rated current or more, where the over-current fault trips. The resistance is that of the shunt
+    times its amplifier's gain, and the voltage is the one without current."""
     supply_signal: Annotated[Text, Option("S", DRIVE, example="0..36 V x 0.075")] = None
     """Signal of the supply voltage at the converter, for --drive current, such as "0..36 V x 0.075" (default: not
     measured). Measuring it makes the current loop faster."""
     coil_temperature: Annotated[Text, Option("T", MACHINE, example="-20..80 degC", read=_temperatures)] = None
     """Lowest and highest coil temperature of the machine, such as "-20..80 degC". Together with --supply it declares a
-    machine whose coil is driven by the duty directly."""
+    machine whose coil is driven by the duty directly; with --drive current --coil has the range."""
     bench_coil: Annotated[Text, Option("T", MACHINE, example="20 degC", read=_temperature)] = None
     """Coil temperature during the recording of the ramps (default: 20 degC)."""
     supply: Annotated[Text, Option("V", MACHINE, example="18..32 V", read=quantity_range("voltage"))] = None

@@ -91,7 +91,7 @@ class FixedOffset:
     sign: int
     #: Over full drive.
     share: Fraction
-    #: Pressure drop at which the bound is lowest, MPa; of a lot that of the valve whose bound is.
+    #: Pressure drop as the bench read it at which the bound is lowest, MPa; of a lot that of the valve whose bound is.
     lowest_at_MPa: Fraction
     #: Interval of the pressure drop on which it is safe, MPa.
     dp_MPa: tuple[Fraction, Fraction]
@@ -115,8 +115,8 @@ def fixed_offset(compensator: Compensator, sign: int = 1) -> FixedOffset:
     pieces = [*(curve.certified.pieces if curve.certified else ()), *_of_the_lot(compensator, sign)]
     bounds = [(piece.at(end), end) for piece in pieces for end in (piece.from_MPa, piece.to_MPa)]
     if error_MPa := allowance.pressures_MPa.get(BENCH_ERROR):
-        highest = curve.dp_MPa[-1] + error_MPa
-        bounds.append((curve.at(highest), highest))  # above the tests it never rises
+        # What was read as the highest drop may have been higher by the error: above the tests the bound never rises.
+        bounds.append((curve.at(curve.dp_MPa[-1] + error_MPa), curve.dp_MPa[-1]))
     least_V, lowest_at = min(bounds)
     kept = sum((share for name, share in allowance.shares.items() if name not in NOT_OF_AN_AMPLIFIER), Fraction(0))
     share = least_V * allowance.factor / compensator.u_max_V - kept

@@ -214,7 +214,7 @@ def in_words(compensator: Compensator) -> list[str]:
         at = units.text(each.dp_MPa, ".2f MPa")
         lines.append(
             f"position loop (P) around the {each.side} side, lag {1e3 * lag_s:g} ms, delay {1e3 * delay_s:g} ms: it "
-            f"comes to rest up to a velocity gain of {rounded_down(each.gain)}/s (an ideal line: "
+            f"comes to rest up to a velocity gain of {rounded_down(each.gain)}/s (a valve without dead zone: "
             f"{rounded_down(each.linear)}/s), at {at}, with any play up to the recorded hysteresis"
         )
     return lines

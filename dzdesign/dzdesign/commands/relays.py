@@ -21,6 +21,8 @@ NOT_LOOKED_AT = (
     "Until that is settled, full command, sides and meter are not looked at. Init with that option and another -o "
     "does so."
 )
+#: Lines of what is open that `init` prints; the file has all.
+MOST_OPEN = 4
 #: A name or a pattern in which no shell finds anything but a name or a pattern.
 PLAIN = re.compile(r"[\w ./*?:\[\],+@%=-]*")
 
@@ -128,8 +130,16 @@ def _whole_lot(summary: Any, arguments: Any) -> bool:
 
 
 def _lines_of_proposal(proposal: Any, arguments: Any) -> Iterator[str]:
+    from dzdesign.terminal.brief import warning_lines
+    from dzdesign.terminal.progress import is_verbose
+
     yield from proposal.seen
-    yield from (f"open: {line}" for line in proposal.opens)
+    if proposal.valve:
+        yield from proposal.warnings if is_verbose() else warning_lines(proposal.valve.warnings)
+    shown = len(proposal.opens) if is_verbose() else MOST_OPEN
+    yield from (f"open: {line}" for line in proposal.opens[:shown])
+    if more := len(proposal.opens[shown:]):
+        yield f"open: {more} more, see OPEN in the file"
     if proposal.opens and proposal.u_seen_V is None:
         yield NOT_LOOKED_AT
     yield f"Written: {arguments.output}" + ("; fill in what is open, then" if proposal.opens else "; read it, then")
@@ -196,7 +206,7 @@ RELAYS: Mapping[str, Relay] = {
             'dzdesign assess before/*.csv --after after/*.csv --limits "dead_zone_opening = 5 %"',
             "dzdesign assess before/*.csv --after after/*.csv --config dzdesign.toml",
         ),
-        "terminal.evidence_tables:print_assessment", _written, holds=_holds,
+        "terminal.brief:print_assessment", _written, holds=_holds,
     ),
     "simulate": Relay(
         "stages.simulate:SimulateArguments", "stages.simulate:simulate",

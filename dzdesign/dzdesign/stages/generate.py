@@ -24,6 +24,9 @@ class OutputChoices:
     interface: Annotated[Text, Option("NAME", OUTPUTS)] = None
     """Inputs of the function block, for iec61131 (default: plc). plc: command in 0.01 % and pressures in 0.1 bar.
     codes: the converter codes of the design."""
+    cycle_time: Annotated[Text, Option("T", OUTPUTS, example="10 ms", read=quantity("time"))] = None
+    """Time between two calls of the function block, for iec61131. With it the block has the design's fault debounce, in
+    whole cycles, and interlock (default: neither)."""
     plant: Annotated[AnyPath | None, Option("PLANT.toml", OUTPUTS)] = None
     """File with a plant, for an FMU of the plant in addition, such as demo/example/plant.toml. It is for the
     output fmu only."""
@@ -119,9 +122,11 @@ def generate(arguments: GenerateArguments) -> "Firmware | Output":
 def chosen_of_outputs(arguments: OutputChoices) -> "dict[str, str | None]":
     """Return the options that are of one output other than a C firmware alone, as they were given; a plant is read."""
     from dzdesign.codegen.amplifier.setting import given_dp_MPa, given_threshold
+    from dzdesign.codegen.integers.interface import cycle_time_s
     from dzdesign.codegen.other_targets import OTHER_TARGETS
 
     given_dp_MPa(arguments.table_dp), given_threshold(arguments.threshold)  # a wrong one is refused before any file
+    cycle_time_s(arguments.cycle_time or "")
     given = {name: getattr(arguments, name) for other in OTHER_TARGETS.values() for name in other.options}
     return given | {"plant": None if arguments.plant is None else _plant_text(Path(arguments.plant))}
 

@@ -28,7 +28,7 @@ from dzdesign.terminal.progress import say, stage_progress, with_bar
 if TYPE_CHECKING:
     from dzdesign.identify.reading.columns import ProposedColumns
     from dzdesign.identify.reading.ramp_test import RampTest
-    from dzdesign.identify.valve.model import ValveModel
+    from dzdesign.identify.valve.model import ValveModel, Warning_
 
 
 #: Full commands that amplifiers have, V: the smallest that the recordings do not exceed by 2 % is proposed.
@@ -47,6 +47,8 @@ class Proposal:
 
     text: str
     seen: tuple[str, ...]
+    #: The first warning of each code, in full.
+    warnings: tuple[str, ...]
     #: What is open: without it `identify` can't run.
     opens: tuple[str, ...]
     #: The files, and the labels of each.
@@ -98,8 +100,9 @@ def propose(arguments: "InitArguments") -> Proposal:
             u_max, u_seen = _full_command(tests)
         valve = _identified(tests, u_max, guessed_dp, remarks)
     seen, opens = tuple(_summary(looks, u_seen, valve, remarks.notes)), tuple(dict.fromkeys(remarks.opens))
+    warnings = tuple(_warnings_in_full(valve.warnings if valve else ()))
     text = _rendered(
-        seen=seen, opens=opens, u_max=u_max, u_seen=u_seen, in_per_cent=in_per_cent,
+        seen=(*seen, *warnings), opens=opens, u_max=u_max, u_seen=u_seen, in_per_cent=in_per_cent,
         skip_rows=read["skip_rows"], missing=read["missing"] or (), ends_at_full=ENDS_AT_FULL,
         sample_rate=arguments.sample_rate,
         meter=valve and valve.meter, negative_drop=_negative_drop(valve),
@@ -107,8 +110,9 @@ def propose(arguments: "InitArguments") -> Proposal:
         unclear=unclear, guessed_dp=guessed_dp, dp=table, readings=readings,
     )  # fmt: skip
     return Proposal(
-        text=text, seen=seen, opens=opens, recordings=tuple(paths), labels=tuple(look.labels for look in looks),
-        columns=chosen, dp=table, u_max_V=u_max, u_seen_V=u_seen, valve=valve,
+        text=text, seen=seen, warnings=warnings, opens=opens, recordings=tuple(paths),
+        labels=tuple(look.labels for look in looks), columns=chosen, dp=table, u_max_V=u_max, u_seen_V=u_seen,
+        valve=valve,
     )  # fmt: skip
 
 
@@ -256,10 +260,14 @@ def _summary(
         where = f"{pressures} {units.label('MPa')}" if pressures else "an unknown pressure drop"
         flow = units.text(max(test.q_max_L_min for test in side.tests), ".3g L/min")
         yield f"{name} commands: {ramps} ramp{'s' if ramps > 1 else ''} at {where}, up to {flow}"
-    warnings = valve.warnings if valve else ()
+
+
+def _warnings_in_full(warnings: "Sequence[Warning_]") -> Iterator[str]:
+    """Yield the first warning of each code, with how often it was raised."""
     counts = Counter(warning.code for warning in warnings)
-    for warning in {each.code: each for each in reversed(warnings)}.values():  # the first of each code
-        times = f" ({counts[warning.code]})" if counts[warning.code] > 1 else ""
+    for code, count in counts.items():
+        warning = next(each for each in warnings if each.code == code)
+        times = f" ({count})" if count > 1 else ""
         yield f"warning [{warning.code}]{times} {f'{warning.source}: ' if warning.source else ''}{warning.text}"
 
 

@@ -1,6 +1,6 @@
 """One screen for a valve, a design and a verification: the result and what limits it. ``-v`` has everything."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from dzdesign.core.display import verdict_words
@@ -12,12 +12,13 @@ from dzdesign.terminal.progress import is_verbose
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from dzdesign.assess.assessment import Assessment, PressureAssessment
+    from dzdesign.assess.options import Set
     from dzdesign.core.recorded_units import RecordedUnits
     from dzdesign.design.compensator import Compensator
     from dzdesign.design.redesign import HysteresisChoice
     from dzdesign.identify.valve.model import ValveModel, Warning_
     from dzdesign.identify.valve.ramp_result import TestResult
-    from dzdesign.identify.valve.side_model import SideModel
     from dzdesign.verify.evidence import Evidence
     from dzdesign.verify.loop_results import PressureResult
     from dzdesign.verify.outputs.verification import OutputVerification
@@ -25,6 +26,10 @@ if TYPE_CHECKING:
 
 #: Characters of a warning beside its code, on a screen of 80.
 LONGEST_WARNING = 76
+#: Lines that warnings take at most.
+MOST_WARNINGS = 4
+#: Limits that do not hold of which each has a line.
+MOST_MISSED = 3
 MORE = "More: -v, and `dzdesign explain CODE`."
 
 
@@ -40,36 +45,54 @@ def print_valve(valve: "ValveModel") -> None:
 
 def put_valve(valve: "ValveModel", console: "Console") -> None:
     """Put the screen of a valve on a page."""
-    for name, side in valve.sides.items():
-        _put_side(console, side, "" if len(valve.sides) == 1 else f", {name} side", valve.recorded_units.of_side(name))
+    _put_thresholds(console, valve)
+    _put_offsets(console, valve)
     put_line(console, tables.meter_line(valve.meter.floor_L_min, valve.meter.lag_in_words(), valve.recorded_units))
     tables.put_units(console, valve.recorded_units, "valve.json")
-    _put_warnings(console, valve.warnings)
+    for line in warning_lines(valve.warnings):
+        put_line(console, line)
 
 
-def _put_side(console: "Console", side: "SideModel", which: str, units: "RecordedUnits") -> None:
-    betas = dict(zip((test.source for test in side.tests), side.beta.beta, strict=False))  # none without a known dP
-
-    def command(value: float | None) -> str:
-        return "-" if value is None else units.number(value, ".3f V")
-
-    columns: dict[str, Column[TestResult]] = {
-        f"dP ({units.label('MPa')})": lambda test: "?" if test.dp_MPa is None else units.number(test.dp_MPa, ".2f MPa"),
-        "ramps": lambda test: str(len(test.ramps)),
-        "opens": lambda test: command(test.u_knee_rising_V),
-        "closes": lambda test: command(test.u_knee_falling_V),
-        "bound": lambda test: command(test.u_guard_lower_V),
-        "beta": lambda test: f"{betas[test.source]:.4f}" if betas else "-",
-        f"Q max ({units.label('L/min')})": lambda test: units.number(test.q_max_L_min, ".1f L/min"),
-    }
-    put_rows(console, f"Thresholds ({units.label('V')}){which}", side.tests, columns, words=())
-    dp0 = side.reference.dp_MPa
+def _put_offsets(console: "Console", valve: "ValveModel") -> None:
+    recorded = valve.recorded_units
+    offsets = {name: recorded.of_side(name).text(side.curve.u_min0_V, ".3f V") for name, side in valve.sides.items()}
+    (name, side), *others = valve.sides.items()
+    confidence = f"{100 * side.certificate.confidence:.6g} %"
+    if others:  # two sides fill the screen: what would gain most stands on the page of -v
+        of_sides = ", ".join(f"{name} {offset}" for name, offset in offsets.items())
+        put_line(console, f"Certified offset where beta is 1, {confidence}: {of_sides}")
+        return
+    units, dp0 = recorded.of_side(name), side.reference.dp_MPa
     at = "" if dp0 is None else f" at {units.text(dp0, '.2f MPa')}"
-    put_line(
-        console,
-        f"Certified offset at zero command: {units.text(side.curve.u_min0_V, '.3f V')}{at}, "
-        f"{100 * side.certificate.confidence:.6g} %. {tables.gains_most(side, units)}.",
-    )
+    gains = tables.gains_most(side, units)
+    put_line(console, f"Certified offset at zero command: {offsets[name]}{at}, {confidence}. {gains}.")
+
+
+def _put_thresholds(console: "Console", valve: "ValveModel") -> None:
+    units, two_sided = valve.recorded_units, len(valve.sides) > 1
+    rows = [
+        (name, test, dict(zip((each.source for each in side.tests), side.beta.beta, strict=False)))
+        for name, side in valve.sides.items()
+        for test in side.tests
+    ]
+
+    def command(side: str, value: float | None) -> str:
+        return "-" if value is None else units.of_side(side).number(value, ".3f V")
+
+    columns: dict[str, Column[tuple[str, TestResult, dict[str, float]]]] = {
+        **({"side": lambda row: row[0]} if two_sided else {}),
+        f"dP ({units.label('MPa')})": lambda row: (
+            "?" if row[1].dp_MPa is None else units.number(row[1].dp_MPa, ".2f MPa")
+        ),
+        "ramps": lambda row: str(len(row[1].ramps)),
+        "opens": lambda row: command(row[0], row[1].u_knee_rising_V),
+        "closes": lambda row: command(row[0], row[1].u_knee_falling_V),
+        "bound": lambda row: command(row[0], row[1].u_guard_lower_V),
+        "beta": lambda row: f"{row[2][row[1].source]:.4f}" if row[2] else "-",  # there is none without a known dP
+        f"flow ({units.label('L/min')})": lambda row: units.number(row[1].q_max_L_min, ".1f L/min"),
+    }
+    words = (0,) if two_sided else ()
+    put_rows(console, f"Thresholds ({units.label('V')}) and largest flow", rows, columns, words)
 
 
 def print_design(compensator: "Compensator") -> None:
@@ -88,16 +111,16 @@ def put_design(compensator: "Compensator", console: "Console") -> None:
     from dzdesign.design.pressure_inputs import not_covered
     from dzdesign.design.redesign import hysteresis_choices, without_sensors
 
-    units = compensator.valve.recorded_units
+    units, sides = compensator.valve.recorded_units, dict[str, list[str]]()
     for sign in compensator.signals.signs:
         certificate = compensator.side(sign).certificate
         low, high = (float(end) for end in certificate.dp_MPa)
-        which = f"{compensator.valve.side_name(sign)}: " if compensator.two_sided else ""
-        put_line(
-            console,
-            f"{which}at zero command the output stays below the {100 * certificate.confidence:.6g} % bound of the "
-            f"{certificate.guard} threshold, {units.span(low, high, '.2f MPa')}, of {compensator.certified_of}.",
-        )
+        sides.setdefault(
+            f"at zero command the output stays below the {100 * certificate.confidence:.6g} % bound of the "
+            f"{certificate.guard} threshold, {units.span(low, high, '.2f MPa')}, of {compensator.certified_of}.", []
+        ).append(compensator.valve.side_name(sign))  # fmt: skip
+    for line, names in sides.items():
+        put_line(console, f"{' and '.join(names)}: {line}" if compensator.two_sided else line)
     choices = hysteresis_choices(compensator)
     if choices:
         _put_choices(console, (without_sensors(compensator), *choices))
@@ -175,7 +198,7 @@ def _put_choices(console: "Console", choices: "Sequence[HysteresisChoice]") -> N
         "dead zone": lambda each: share(each.onset),
         "hysteresis": lambda each: share(each.hysteresis),
     }
-    put_rows(console, "Left, % of command: largest dead zone on opening, mean hysteresis", choices, columns)
+    put_rows(console, "Left (% of command): largest dead zone, mean hysteresis", choices, columns)
     for each in choices:
         if each.refused:
             put_line(console, f"{each.given}: {each.refused}")
@@ -183,16 +206,59 @@ def _put_choices(console: "Console", choices: "Sequence[HysteresisChoice]") -> N
             put_line(console, f"{each.given}: {each.possible}.")
 
 
-def _put_warnings(console: "Console", warnings: "Iterable[Warning_]") -> None:
-    """Print a line for each code, with how often it was raised."""
+def print_assessment(assessment: "Assessment") -> None:
+    """Print dead zone, hysteresis and flows without and with the compensator, and the limits that do not hold."""
+    if is_verbose():
+        evidence_tables.print_assessment(assessment)
+        return
+    console, units = new_console(), assessment.recorded_units
+    pressures = evidence_tables.shown_pressures(assessment) or assessment.pressures
+
+    def change(key: str, form: str) -> "Column[PressureAssessment]":
+        def shown(item: "PressureAssessment", name: "Set") -> str:
+            reading = item.readings(name).get(key)
+            known = None if reading is None else reading.at_most if reading.value is None else reading.value
+            if reading is None or known is None:
+                return "–"
+            number = units.number(known, form) if "L/min" in form else f"{known:{form}}"
+            return number if reading.value is not None else f"≤{number}"
+
+        return lambda item: f"{shown(item, 'before')} → {shown(item, 'after')}"
+
+    columns: dict[str, Column[PressureAssessment]] = {
+        "side": lambda item: item.side,
+        f"dP ({units.label('MPa')})": lambda item: (
+            "–" if item.dp_MPa is None else units.number(item.dp_MPa, ".2f MPa")
+        ),
+        "dead zone (%)": change("dead_zone_opening", ".1f"),
+        "hysteresis (%)": change("hysteresis", ".1f"),
+        f"flow at zero ({units.label('L/min')})": change("flow_at_zero", ".2f L/min"),
+        f"largest ({units.label('L/min')})": change("largest_flow", ".2f L/min"),
+    }
+    put_rows(console, "Without → with the compensator, on opening at the reading flow", pressures, columns)
+    if hidden := evidence_tables.not_observable(assessment):
+        put_line(console, f"not observable: {len(hidden)} kinds of reading, see -v")
+    *limits, verdict = evidence_tables.limit_lines(assessment)
+    missed = [line for line in limits if not line.startswith(f"{verdict_words(True)} ")]
+    for line in (*warning_lines(assessment.notes, "note"), *map(_shortened, missed[:MOST_MISSED]), verdict):
+        put_line(console, line)
+    tables.put_units(console, units, "assessment.json")
+    put_line(console, "More: -v, with every quantity.")
+
+
+def warning_lines(warnings: "Iterable[Warning_]", word: str = "warning") -> Iterator[str]:
+    """Yield a line for each code, with how often it was raised; of many the last ones' codes share a line."""
     counts: dict[str, int] = {}
     first: dict[str, str] = {}
     for each in warnings:
         counts[each.code] = counts.get(each.code, 0) + 1
         first.setdefault(each.code, f"{each.source}: {each.text}" if each.source else each.text)
-    for code, count in counts.items():
-        times = f" ({count})" if count > 1 else ""
-        put_line(console, _shortened(f"warning [{code}]{times} {first[code]}"))
+    times = {code: f" ({count})" if count > 1 else "" for code, count in counts.items()}
+    shown = len(counts) if len(counts) <= MOST_WARNINGS else MOST_WARNINGS - 1
+    for code in list(counts)[:shown]:
+        yield _shortened(f"{word} [{code}]{times[code]} {first[code]}")
+    if rest := [code + times[code] for code in counts][shown:]:
+        yield f"further {word}s: {', '.join(rest)}"
 
 
 def _shortened(text: str) -> str:

@@ -104,30 +104,30 @@ def print_assessment(assessment: "Assessment") -> None:
     from dzdesign.report.sections.quantities import characteristic_quantities
 
     page, units, meter = new_console(), assessment.recorded_units, assessment.meter
-    shown = replace(assessment, pressures=tuple(_shown_pressures(assessment)) or assessment.pressures)
+    shown = replace(assessment, pressures=tuple(shown_pressures(assessment)) or assessment.pressures)
     section = characteristic_section(characteristic_quantities(None, shown, (), ()), units)
     put_facts(page, *section.tables)
     lines = [
         *section.lines,
-        *_not_observable(assessment),
+        *not_observable(assessment),
         *_remarks(assessment),
         meter_line(meter.floor_L_min, lag_in_words(meter.lag_s, meter.lag_is), units),
         *(f"note [{each.code}] {f'{each.source}: ' if each.source else ''}{each.text}" for each in assessment.notes),
-        *_limits(assessment),
+        *limit_lines(assessment),
     ]
     for line in lines:
         put_line(page, line)
     put_units(page, units, "assessment.json")
 
 
-def _not_observable(assessment: "Assessment") -> list[str]:
+def not_observable(assessment: "Assessment") -> list[str]:
     """Return a sentence for each reason why something is not observable, with all pressure drops that it holds for."""
     from dzdesign.assess.options import SETS
     from dzdesign.assess.quantities import QUANTITIES
 
     units = assessment.recorded_units
     reasons: dict[tuple[str, str], dict[str, list[str]]] = {}
-    for item in _shown_pressures(assessment):
+    for item in shown_pressures(assessment):
         for name in SETS:
             for key, reading in item.readings(name).items():
                 if reading.value is None and not (key == "symmetry" and _one_sided(assessment)):
@@ -152,14 +152,14 @@ def _remarks(assessment: "Assessment") -> list[str]:
 
     return [
         f"{QUANTITIES[key].name}, {name.upper()} at {item.place(assessment.recorded_units)}: {reading.note}"
-        for item in _shown_pressures(assessment)
+        for item in shown_pressures(assessment)
         for name in SETS
         for key, reading in item.readings(name).items()
         if reading.note
     ]
 
 
-def _shown_pressures(assessment: "Assessment") -> list["PressureAssessment"]:
+def shown_pressures(assessment: "Assessment") -> list["PressureAssessment"]:
     """Return those with a recording with the compensator: of the others there is a note, and all in the JSON."""
     return [item for item in assessment.pressures if item.after]
 
@@ -168,8 +168,8 @@ def _one_sided(assessment: "Assessment") -> bool:
     return len({item.side for item in assessment.pressures}) == 1
 
 
-def _limits(assessment: "Assessment") -> list[str]:
-    """Return a line for each limit and recording, the verdict first."""
+def limit_lines(assessment: "Assessment") -> list[str]:
+    """Return a line for each limit and recording, its verdict first, and a line for all of them."""
     from dzdesign.assess.quantities import LIMITED
 
     if not assessment.limits:

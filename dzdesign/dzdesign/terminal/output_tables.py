@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from dzdesign.core.artefact_files import MANIFEST_NAME
 from dzdesign.terminal.page import Column, new_console, put_line, put_rows
-from dzdesign.terminal.tables import put_units
+from dzdesign.terminal.tables import put_files, put_units
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -36,8 +36,7 @@ def print_output(output: "Output", console: "Console | None" = None, folder: str
     place = f", in folder '{folder}'" if folder else ""
     settings = output.manifest.settings_in_words
     put_line(console, f"Output for {output.manifest.target}{settings}, law '{output.manifest.law}'{place}:")
-    for name in (*output.contents, MANIFEST_NAME):
-        put_line(console, f"  {name}")
+    put_files(console, (*output.contents, MANIFEST_NAME))
     if output.manifest.target == "amplifier":
         _put_setting(console, output.compensator, output.manifest.settings)
 

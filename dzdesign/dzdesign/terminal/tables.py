@@ -252,5 +252,14 @@ def print_firmware(firmware: "Firmware", console: "Console | None" = None, folde
     place = f", in folder '{folder}'" if folder else ""
     manifest = firmware.manifest
     put_line(console, f"Firmware for target {manifest.target} with law '{manifest.law}'{common}{place}:")
-    for name in (*firmware.contents, MANIFEST_NAME):
-        put_line(console, f"  {name}")
+    put_files(console, (*firmware.contents, MANIFEST_NAME))
+
+
+def put_files(console: "Console", names: "Sequence[str]") -> None:
+    """Print the names of files, a line for each folder that they are in."""
+    folders: dict[str, list[str]] = {}
+    for name in names:
+        folder, _, file = name.rpartition("/")
+        folders.setdefault(folder, []).append(file)
+    for folder, files in folders.items():
+        put_line(console, f"  {folder and f'{folder}/: '}{', '.join(files)}")

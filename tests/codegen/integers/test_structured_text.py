@@ -7,11 +7,13 @@ from xml.etree import ElementTree
 import pytest
 from lark import LarkError
 
+from dzdesign.codegen.integers.interface import cycle_time_s, interface_named
 from dzdesign.codegen.integers.law import block_form
 from dzdesign.codegen.integers.plc import note_of, output_files, structured_text
 from dzdesign.codegen.other_targets import OTHER_TARGETS, generate_output, settings_of
 from dzdesign.codegen.project import target_named
 from dzdesign.core.errors import InputError
+from dzdesign.verify.outputs.exact_block import cycles_of
 from tests.support.core_variants import VARIANTS, variant
 from tests.support.example_coil import SENSORS, with_current
 from tests.support.golden_firmware import FULL, GOLDENS, golden_compensator
@@ -20,12 +22,14 @@ from tests.support.st_words import RESERVED, is_reserved
 
 ROOTS = {"one solenoid": GOLDENS, "two solenoids": FULL}
 DIGEST = "0" * 64
+#: With PLC units the block counts cycles, with codes it judges each by itself.
+CYCLES = {"plc": "1 ms", "codes": ""}
 
 
 @pytest.fixture(scope="module", params=[(name, kind) for name in ROOTS for kind in ("plc", "codes")], ids=" ".join)
 def text(request):
     name, interface = request.param
-    return structured_text(golden_compensator(root=ROOTS[name]), DIGEST, interface)
+    return structured_text(golden_compensator(root=ROOTS[name]), DIGEST, interface, CYCLES[interface])
 
 
 def code_of(text):
@@ -56,7 +60,7 @@ def test_names_are_others_whatever_the_case_and_none_is_a_word_of_the_standard_o
 @pytest.mark.parametrize("name", ["one solenoid", "two solenoids", *VARIANTS])
 def test_it_is_of_the_standards_grammar(name, interface):
     made = golden_compensator(root=ROOTS[name]) if name in ROOTS else variant(name)
-    grammar().parse(structured_text(made, DIGEST, interface))
+    grammar().parse(structured_text(made, DIGEST, interface, CYCLES[interface]))
 
 
 @pytest.mark.parametrize(
@@ -86,7 +90,7 @@ def test_a_fault_is_refused_by_the_grammar(old, new):
 
 
 def output(root, dialect, interface):
-    settings = {"dialect": dialect, "interface": interface}
+    settings = {"dialect": dialect, "interface": interface, "cycle_time": "1 ms"}
     return generate_output(golden_compensator(root=root), "iec61131", settings).files
 
 
@@ -116,19 +120,53 @@ def test_plcopen_declares_every_variable_with_its_type():
     sections = [(each.tag.removeprefix(namespace), each.get("constant")) for each in interface]
     assert sections == [("inputVars", None), ("outputVars", None), ("localVars", None), ("localVars", "true")]
     names = [each.get("name") for each in interface.iter(f"{namespace}variable")]
-    assert {"command", "output_b", "side", "LAW_NODES", "sum_1"} <= set(names) and len(names) == len(set(names))
+    assert {"command", "enable", "output_b", "side", "valid_commands", "LAW_NODES", "sum_1"} <= set(names)
+    assert len(names) == len(set(names))
 
 
 def test_what_a_block_leaves_out_is_said():
     both = golden_compensator(root=FULL)
-    assert all(name in note_of(both, {}) for name in ("dither", "ramps", "debouncing", "latching", "interlock"))
-    assert "dither" in structured_text(both, DIGEST, "plc")
+    counted = ("debouncing", "interlock")
+    assert all(name in note_of(both, {"cycle_time": ""}) for name in ("dither", "ramps", "latching", *counted))
+    assert not any(name in note_of(both, {"cycle_time": "1 ms"}) for name in counted)
+    assert "dither" in structured_text(both, DIGEST, "plc", "1 ms")
+
+
+@pytest.mark.parametrize(
+    ("asked", "cycle_time", "cycles"),
+    [
+        ("50 ms", "10 ms", 5), ("50 ms", "0.01 s", 5), ("51 ms", "10 ms", 6), ("99.9 ms", "33.3 ms", 3),
+        ("5 samples", "10 ms", 1), ("5 samples", "1 ms", 4), ("5 samples", "800 us", 5), ("5 samples", "", 0),
+    ],
+)  # fmt: skip
+def test_the_debounce_time_is_the_least_whole_number_of_cycles_that_is_not_shorter(asked, cycle_time, cycles):
+    """A number of samples is the time that they take at the firmware's rate, 1.25 kHz."""
+    made = golden_compensator()
+    functions = replace(made.drive_functions, fault_samples=5 if "samples" in asked else 1000)
+    target = target_named("f28335").inputs()
+    made = replace(made, drive_functions=functions, target=target, options={"fault_debounce": asked})
+    assert interface_named("plc", made, cycle_time).fault_cycles == cycles_of(made, cycle_time) == cycles
+    text = structured_text(made, DIGEST, "plc", cycle_time)
+    assert (f"FAULT_CYCLES : DINT := {cycles};" in text) == ("enable : BOOL;" in text) == (cycles > 0)
+
+
+def test_without_an_interlock_a_new_block_follows_at_once():
+    made = golden_compensator()
+    made = replace(made, drive_functions=replace(made.drive_functions, interlock_codes=None))
+    text = structured_text(made, DIGEST, "plc", "1 ms")
+    assert "valid_commands : DINT := 4;" in text and "enable" not in text and "INTERLOCK" not in text
+
+
+@pytest.mark.parametrize("text", ["10", "2 s", "1 us", "0 ms", "10 bar"])
+def test_no_cycle_time_of_a_plc_is_refused(text, wording):
+    with wording.refusal(InputError):
+        cycle_time_s(text)
 
 
 def test_current_control_is_refused(wording):
     made = with_current(golden_compensator(), target_named("f28335"), SENSORS["supply unknown"])
     with wording.refusal(InputError):
-        output_files(made, None, {"dialect": "codesys", "interface": "plc"})
+        output_files(made, None, settings_of("iec61131", {}))
 
 
 def test_a_law_that_needs_more_than_32_bits_is_refused(wording):
@@ -140,5 +178,5 @@ def test_a_law_that_needs_more_than_32_bits_is_refused(wording):
 
 def test_settings_are_the_defaults_where_none_were_given():
     known = OTHER_TARGETS["iec61131"].options
-    assert settings_of("iec61131", {}) == {name: values[0] for name, values in known.items()}
+    assert settings_of("iec61131", {}) == {name: (values or ("",))[0] for name, values in known.items()}
     assert settings_of("f28335", {"dialect": None}) == {}

@@ -31,7 +31,8 @@ from tests.dzdesign.batch.test_batch import NOTHING, rows, tree
 from tests.support.golden_firmware import golden_compensator
 from tests.support.many_valves import lot_options, write_lot
 
-PLC = WantedOutput(target="iec61131", settings={"dialect": "codesys", "interface": "plc"}, folder="plc")
+SETTINGS = {"dialect": "codesys", "interface": "plc", "cycle_time": ""}
+PLC = WantedOutput(target="iec61131", settings=SETTINGS, folder="plc")
 SEED = 7
 #: The last one's current is controlled, which no function block does.
 LIST = """name,files,drive,coil,rated_current,supply,current_signal
@@ -50,6 +51,7 @@ V0002,V0002/*.csv,current,3.5 ohm 40 mH,1 A,18..32 V,0..1.2 A on 2 ohm + 0.15 V
         {"outputs": ""},
         {"outputs": "iec61131", "dialect": "twncat"},
         {"outputs": "fmu", "dialect": "twincat"},
+        {"outputs": "iec61131", "cycle_time": "10"},
         {"outputs": "iec61131", "plant": "examples/paper_valve/plant.toml"},
         {"interface": "codes"},
         {"outputs": "amplifier"},
@@ -67,7 +69,7 @@ def test_the_settings_are_those_of_each_output():
     assert wanted_outputs(BatchArguments("lot")) == ()
     plant = {"plant": "examples/paper_valve/plant.toml"}
     plc, fmu = wanted_outputs(BatchArguments("lot", outputs=" iec61131, fmu", dialect="twincat", **plant))
-    assert (plc.settings, plc.folder) == ({"dialect": "twincat", "interface": "plc"}, "plc")
+    assert (plc.settings, plc.folder) == ({"dialect": "twincat", "interface": "plc", "cycle_time": ""}, "plc")
     assert fmu.folder == "fmu" and json.loads(fmu.settings["plant"])
     assert wanted_outputs(BatchArguments("lot", verify=True, **plant)) == ()  # of the verification alone
 

@@ -5,13 +5,21 @@ import os
 import re
 import shlex
 import shutil
+import textwrap
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from dzdesign.codegen.project import target_named
 from dzdesign.command_line.cli import main
+from dzdesign.design.options import options_of as design_options
+from dzdesign.identify import identification
+from dzdesign.identify.data_quality.catalogue import catalogue
+from dzdesign.identify.identification import identify
+from dzdesign.identify.valve.model import Warning_
 from tests.support.synthetic import L_MIN, MPA, Truth, synthetic_ramp
 
 LABELS = "Zeit (s),AO0 [V],Durchfluss [L/min],Temp [degC]"
@@ -317,6 +325,27 @@ def test_every_commented_line_of_an_option_may_be_uncommented(here):
     options = tomllib.loads("\n".join(line for line in lines if " (in " not in line))
     assert {"pressure-span", "order", "meter-lag", "machine", "record"} <= set(options) and len(unread) <= 1
     assert "amplifier" in options["machine"]
+    names = ("drive", "coil", "rated-current", "current-signal", "supply-signal")
+    texts = {name.replace("-", "_"): options[name] for name in names} | {"supply": options["machine"]["supply"]}
+    assert design_options(texts, target_named("f28335").inputs()).current is not None
+
+
+@pytest.mark.parametrize("without_pressure", [False, True])
+def test_the_screen_has_24_rows_at_most_and_the_file_has_the_rest(here, capsys, monkeypatch, without_pressure):
+    """Twenty recordings of a valve with two solenoids, with every warning that there is."""
+    for number in range(20):
+        time, u, dp, q = columns_of(1.0 + number % 5, sign=(-1) ** (number // 10), rate_Hz=10, knee=5 + number / 50)
+        labels, pressure = ("t_s,u_V,Q_Lmin", ()) if without_pressure else ("t_s,u_V,dP_MPa,Q_Lmin", (dp,))
+        write(f"r{number}.csv", labels, time, u, *pressure, q)
+    warnings = tuple(Warning_(code=code, text="a text " * 30, source="r1.csv") for code in catalogue())
+    warned = {"warnings": warnings, "simulated": True}
+    monkeypatch.setattr(identification, "identify", lambda *arguments: replace(identify(*arguments), **warned))
+    assert main(["init", "r*.csv"]) == int(without_pressure)
+    rows = [row for line in capsys.readouterr().out.splitlines() for row in textwrap.wrap(line, 78)]
+    text = Path("dzdesign.toml").read_text()
+    assert len(rows) <= 24, "\n".join(rows)
+    assert text.count("# OPEN: pressure drop of") == (20 if without_pressure else 0)
+    assert text.count("# warning [") == (0 if without_pressure else len(warnings))
 
 
 def test_a_pressure_from_a_name_is_said_and_units_as_people_write_them(here, capsys):
@@ -348,7 +377,7 @@ def test_names_that_contradict_the_column_are_said(here, capsys, dither):
     assert main(["init", "ramp_5MPa.csv", "-o", "one.toml"]) == 0
     said = capsys.readouterr().out
     told = "CHECK: a name says another pressure drop than the column: 'ramp_5MPa.csv' holds 1 MPa; the sensor"
-    told = told if dither else "warning [pressure-stuck] ramp_5MPa.csv: the pressure drop is 1 MPa to the last digit"
+    told = told if dither else "warning [pressure-stuck] ramp_5MPa.csv: the pressure drop is 1 MPa"
     assert told in said and f"# {told}" in Path("one.toml").read_text()
     assert main(["init", "ramp_5MPa.csv", "ramp_1MPa.csv", "ramp_2MPa.csv", "-o", "three.toml"]) == 1
     said = capsys.readouterr().out  # flows of three pressures taken for one test have no line
@@ -400,8 +429,8 @@ def test_one_stuck_sensor_and_flows_that_differ_are_said(here, capsys):
         write(name, "t_s,u_V,dP_MPa,Q_Lmin", time, u, dp + 0.001 * noise, q * (2 if name == "b.csv" else 1))
     assert main(["init", "a.csv", "b.csv", "c.csv"]) == 0
     said = capsys.readouterr().out
-    assert "warning [pressure-stuck] a.csv: the pressure drop is 1 MPa to the last digit" in said
-    assert "warning [flow-contradicts-dp] recordings that are taken as one test, at" in said
+    assert "warning [pressure-stuck] a.csv: the pressure drop is 1 MPa" in said
+    assert "warning [flow-contradicts-dp] recordings that are taken as one" in said
 
 
 def test_several_recordings_without_a_pressure_are_open(here, capsys):

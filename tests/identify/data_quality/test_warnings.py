@@ -247,6 +247,22 @@ class TestKneeErrors:
         warning = sweeps._bent(row, 0.1, (0.12, 0.5))
         wording.of_test(str(warning.text))
 
+    def test_the_lower_window_that_curved_names_finds_the_knee_better_and_a_wider_one_worse(self):
+        test = synthetic_ramp(1.0, Truth(noise=0.0))
+        knees = np.where(np.arange(test.u.size) < test.u.size / 2, 5.4, 5.3)
+        travel = np.clip(test.u - knees, 0, None) / (10 - knees)
+        noise = 0.08 * np.random.default_rng(1).standard_normal(test.u.size)
+        bent = replace(test, q=(18 * (travel - 0.13 * travel**2) + noise) * L_MIN)
+
+        def too_low_V(valve):
+            return 5.3 - valve.positive.tests[0].u_knee_falling_V
+
+        default = identify([bent])
+        (warning,) = warned(default, "curved")
+        low, high = (int(number) / 100 for number in re.search(r"such as (\d+)-(\d+)", warning.text).groups())
+        lower, wider = (identify([bent], IdentifyOptions(knee_window=each)) for each in ((low, high), (0.12, 0.8)))
+        assert 0 < too_low_V(lower) < 0.5 * too_low_V(default) < 0.3 * too_low_V(wider)
+
 
 class TestStuckPressure:
     @staticmethod

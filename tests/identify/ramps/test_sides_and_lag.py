@@ -115,7 +115,7 @@ class TestSides:
             Path(test.source).write_bytes(ramp_file_bytes(columns, (), compress=False))
         assert main(["identify", *(test.source for test in recordings)]) == 0
         out = capsys.readouterr().out
-        assert "Thresholds (V), positive side" in out and "Thresholds (V), negative side" in out
+        assert "  positive " in out and "  negative " in out
         assert set(json.loads(Path("valve.json").read_text())["sides"]) == {"positive", "negative"}
         assert main(["design", "valve.json"]) == 0
 

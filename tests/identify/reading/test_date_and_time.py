@@ -202,3 +202,25 @@ def test_recordings_that_overlap_are_seen(read):
     first, early = read(two_columns()), read(two_columns(start=LATE + datetime.timedelta(seconds=20)), name="b.csv")
     after = read(two_columns(days=1), name="c.csv")
     assert runs_back([first, early]) == (first, early) and runs_back([first, after]) is None
+
+
+@pytest.mark.parametrize(
+    ("labels", "form", "known"),
+    [
+        ("Zeit [s];Zeitstempel;u [V];dP [MPa];Q [l/min]", "%d.%m.%Y %H:%M:%S,%f", True),
+        ("time [s];timestamp;u [V];dP [MPa];Q [l/min]", "%Y-%m-%d %H:%M:%S", True),
+        ("time [s];Pruefung;u [V];dP [MPa];Q [l/min]", "%Y-%m-%d 07:00:00", False),
+        ("time [s];Zeitstempel;u [V];dP [MPa];Q [l/min]", "%H:%M:%S,%f", False),
+        ("time [s];Zeitstempel;u [V];dP [MPa];Q [l/min]", "Ramp %H %M", False),
+        ("time [s];Zeitstempel;u [V];dP [MPa];Q [l/min]", "%d.%m.%Y %H:%M", False),
+    ],
+)
+def test_dates_beside_a_clock_that_counts_are_its_own_if_they_run_with_it(read, labels, form, known):
+    """The clock may begin anywhere; a date that stands still is of something else."""
+    counted = [f"{5 + 0.04 * row:.2f}" for row in range(TIME.size)]
+    dates = [(LATE + datetime.timedelta(seconds=0.04 * row)).strftime(form) for row in range(TIME.size)]
+    test = read(text(labels, *rows(counted, dates, U, DP, Q)), {"time": labels.split(";")[0]})
+    np.testing.assert_allclose(test.time, 5 + TIME, atol=6e-4)
+    assert (test.stamp is not None) is known and test.started == (test.stamp.seconds if known else None)
+    if known:
+        assert abs(test.stamp.seconds - (FIRST.seconds - 5)) < 1

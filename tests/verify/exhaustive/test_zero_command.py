@@ -19,7 +19,7 @@ from dzdesign.design.options import DesignOptions
 from dzdesign.identify import identification
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.verify.exhaustive import all_inputs
-from dzdesign.verify.exhaustive.all_inputs import map_inputs
+from dzdesign.verify.exhaustive.all_inputs import drives_at_zero
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import PreparedInputs, differences
 from dzdesign.verify.exhaustive.zero_command import counted_dither, guarded_bounds, pressure_drops, zero_command_margins
@@ -185,7 +185,7 @@ def test_the_drawn_bound_is_that_of_the_check(example_tests, monkeypatch, premis
 
     prepared = PreparedInputs(ExactLaw(compensator, 1))
     at_zero = answers_at_zero(prepared)
-    drawn = map_inputs(prepared, at_zero)["zero_command_positive.csv"]
+    drawn = drives_at_zero(prepared, at_zero)["zero_command_positive.csv"]
     margin = drawn["bound_V"] - drawn["drive_V"]
     (expected,) = zero_command_margins(prepared.exact, prepared.differences, at_zero, [lowered])
     assert margin.min() == pytest.approx(float(expected.margin_V), abs=1.1e-5)  # as rounded to be stored

@@ -14,7 +14,7 @@ from dzdesign.core.errors import RequirementError
 from dzdesign.design.signal_text import command_signal, parse_signal
 from dzdesign.design.target_inputs import Converter
 from dzdesign.verify.folder import read_compensator, read_output_manifest
-from dzdesign.verify.outputs import texts
+from dzdesign.verify.outputs import every_cycle, texts
 from dzdesign.verify.outputs.every_pair import EveryPair
 from dzdesign.verify.outputs.texts import (
     available_octave,
@@ -23,12 +23,13 @@ from dzdesign.verify.outputs.texts import (
     function_in_octave,
     running,
 )
+from dzdesign.verify.requirements import DEBOUNCE
 from tests.support.core_variants import VARIANTS, variant
 from tests.support.golden_firmware import FULL, golden_compensator
 from tests.support.octave import OCTAVE, needs_octave
 from tests.support.synthetic import needs_compiler
 
-SETTINGS = {"iec61131": {"dialect": "twincat", "interface": "codes"}, "matlab": {}}
+SETTINGS = {"iec61131": {"dialect": "twincat", "interface": "codes", "cycle_time": ""}, "matlab": {}}
 EXACT = "equals the exactly rounded law"
 DESIGNS = ("no transition", "live zero", "inverted", "bipolar, all options")
 
@@ -73,7 +74,7 @@ def test_a_good_block_holds(folder):
     assert all(check.holds for check in found.checks), found.checks
     assert all(each.inputs > 10_000 and each.wrong == 0 for each in found.inputs) and len(found.inputs) == 2
     margin = next(check.text for check in found.checks if check.id == "over-compensation")
-    assert margin.startswith("0 pressure drops above") and "smallest margin 0.0" in margin
+    assert margin.startswith("0 pressure drops above") and "smallest margin 0." in margin
 
 
 def without_imported(folder):
@@ -89,6 +90,7 @@ def without_imported(folder):
         ("OUTPUT_LIMIT : DINT := 6", "OUTPUT_LIMIT : DINT := 5", {"exact-law"}),
         ("ahead * SLOPE", "(ahead * 20000) * SLOPE", {"overflow"}),
         ("at_rest : BOOL := TRUE", "at_rest : BOOL := FALSE", {"exact-law"}),
+        ("at_rest : BOOL := TRUE", "at_rest : BOOL", {"exact-law"}),
         ("drive := MIN", "IF valid THEN drive := 0; END_IF;\ndrive := MIN", {"exact-law"}),
     ],
 )
@@ -111,6 +113,28 @@ def test_a_file_for_a_tool_with_another_block_is_seen(folder, file, old, new, sa
     edited(folder / "iec61131" / file, old, new)
     (check,) = checks_of(folder, "iec61131").checks
     assert check.id == "exact-law" and check.holds is False and file in check.text and said in check.text
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("MIN(valid_commands + 1, FAULT_CYCLES)", "MIN(valid_commands + 2, FAULT_CYCLES)"),
+        ("limited <= INTERLOCK", "INTERLOCK <= limited"),
+        ("SEL(NOT failed, 0, MIN(valid_pressures", "SEL(failed, 0, MIN(valid_pressures"),
+    ],
+    ids=["a count of two", "interlock inverted", "valid for invalid"],
+)
+def test_a_wrong_count_does_not_hold_by_name(tmp_path, monkeypatch, old, new):
+    monkeypatch.setattr(every_cycle, "FEWEST_CYCLES", 40)
+    settings = {**SETTINGS["iec61131"], "cycle_time": "1 ms"}
+    write_generated(generate_output(golden_compensator(), "iec61131", settings), tmp_path / "iec61131")
+    without_imported(tmp_path)
+    held = {check.id: check.holds for check in checks_of(tmp_path, "iec61131").checks}
+    edited(tmp_path / "iec61131" / "FB_DeadZone.st", old, new)
+    checks = checks_of(tmp_path, "iec61131").checks
+    missed = next(check for check in checks if check.id == "debounce")
+    assert held["debounce"] is True and missed.holds is False
+    assert missed.name == f"FB_DeadZone.st: {DEBOUNCE.title}"
 
 
 def test_a_lower_bound_that_is_exceeded_is_seen(folder):
@@ -220,7 +244,7 @@ def test_the_command_writes_the_evidence(example_compensator, tmp_path, capsys):
 
 def test_a_block_of_two_solenoids_keeps_the_bounds_of_both(tmp_path):
     made = golden_compensator(root=FULL)
-    settings = {"dialect": "codesys", "interface": "plc"}
+    settings = {"dialect": "codesys", "interface": "plc", "cycle_time": "1 ms"}
     write_generated(generate_output(made, "iec61131", settings), tmp_path / "iec61131")
     found = checks_of(tmp_path, "iec61131")
     assert all(check.holds for check in found.checks)
@@ -233,7 +257,7 @@ def test_each_side_of_a_block_is_compared_with_its_own_end_of_zero(tmp_path, mon
     made = variant("unlike sides")
     sides = interface_named("plc", made).sides
     assert sides[1].leave_zero != sides[-1].leave_zero
-    settings = {"dialect": "codesys", "interface": "plc"}
+    settings = {"dialect": "codesys", "interface": "plc", "cycle_time": ""}
     write_generated(generate_output(made, "iec61131", settings), tmp_path / "iec61131")
     found = checks_of(tmp_path, "iec61131").checks
     assert all(check.holds for check in found), [check.text for check in found if not check.holds]

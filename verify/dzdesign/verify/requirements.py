@@ -70,6 +70,12 @@ REPRODUCED = Requirement(id="reproduced", title="the files are reproduced from c
 #: Of Structured Text, and `STATES` of a function for MATLAB too.
 OVERFLOW = Requirement(id="overflow", title="no operation leaves the range of its type")
 STATES = Requirement(id="states", title="status and what is remembered match their description")
+#: Of Structured Text that counts cycles.
+DEBOUNCE = Requirement(
+    id="debounce",
+    title="a fault ends after its good cycles, and the interlock waits for zero command",
+    how="`verify` of a function block with a cycle time",
+)
 COMPILES = Requirement(id="compiles", title="compiles without warnings")
 INT_WIDTH = Requirement(id="int-width", title="no operation needs an int wider than the target's 16 bits")
 EXACT_LAW = Requirement(id="exact-law", title="equals the exactly rounded law")

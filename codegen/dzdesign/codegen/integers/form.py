@@ -33,7 +33,7 @@ class Node:
     name: str = ""
     #: What it is, with its unit and equation; of a constant and of a named operation.
     meaning: str = ""
-    #: Values of a constant: one, or those of a table.
+    #: Values of a constant, one or those of a table; the first value of what is remembered.
     values: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
@@ -174,8 +174,16 @@ class Form:
     outputs: tuple[str, ...] = ()
 
     def input(self, name: str, low: int, high: int, *, boolean: bool = False) -> Node:
-        """Return an input, or what is remembered of the last call."""
+        """Return an input."""
         self.inputs.append(Node(operation="input", low=low, high=high, bits=self.bits, name=name, boolean=boolean))
+        return self.inputs[-1]
+
+    def memory(self, name: str, low: int, high: int, first: int, meaning: str, *, boolean: bool = False) -> Node:
+        """Return what is remembered of the last call, in the first one its first value; a line assigns it anew."""
+        self.inputs.append(
+            Node(operation="input", low=low, high=high, bits=self.bits, name=name, boolean=boolean, meaning=meaning,
+                 values=(first,))
+        )  # fmt: skip
         return self.inputs[-1]
 
     def constant(self, name: str, values: tuple[int, ...], meaning: str) -> Node:
@@ -193,9 +201,8 @@ class Form:
 
     @property
     def remembered(self) -> list[Node]:
-        """Inputs that a line assigns anew: for the next call."""
-        assigned = {line.name for line in self.lines}
-        return [each for each in self.inputs if each.name in assigned]
+        """What is remembered for the next call."""
+        return [each for each in self.inputs if each.values]
 
     @property
     def own(self) -> list[Node]:

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil, floor
 
-from dzdesign.core.errors import InputError
+from dzdesign.core.errors import InputError, quoted
+from dzdesign.core.units import parse_quantity
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.signals import WEIGHT_UNIT, InputPair, PressureSignal
 
@@ -18,6 +19,9 @@ from dzdesign.design.signals import WEIGHT_UNIT, InputPair, PressureSignal
 FULL = 10_000
 PRESSURE_MPa = Fraction(1, 100)
 DINT_MAX = 2**31 - 1
+#: Cycle times of a PLC, and the parts of a second that times are rounded to.
+SHORTEST_CYCLE_S, LONGEST_CYCLE_S = Fraction(1, 20_000), Fraction(1)
+PER_SECOND = 10**9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,6 +43,8 @@ class SideScaling:
     transition: int
     #: The command must pass this to leave zero command, or to change the side.
     leave_zero: int
+    #: The interlock takes a command up to this for zero command; None without an interlock.
+    interlock: int | None
     #: Names of the pressure inputs ahead and behind, and what one number behind weighs, over `weight_unit`.
     pair: InputPair
     weight: int
@@ -73,10 +79,49 @@ class Interface:
     #: Whether the output is rounded to the nearest, a half up; else it is rounded down.
     rounds: bool
     sides: Mapping[int, SideScaling]
+    #: Valid cycles in a row that end a fault; 0: each cycle is judged by itself.
+    fault_cycles: int
+
+    @property
+    def three(self) -> bool:
+        """True if the two sides read different pressures."""
+        return "C" in self.pressures
 
 
-def interface_named(name: str, compensator: Compensator) -> Interface:
-    """Return the scaling of an interface, ``plc`` or ``codes``, for a compensator."""
+def cycle_time_s(text: str) -> Fraction | None:
+    """Return the cycle time of ``--cycle-time``, s; None where it was not given.
+
+    Examples
+    --------
+    >>> cycle_time_s("10 ms"), cycle_time_s("")
+    (Fraction(1, 100), None)
+    """
+    if not text:
+        return None
+    cycle_s = _seconds(text, "--cycle-time")
+    if not SHORTEST_CYCLE_S <= cycle_s <= LONGEST_CYCLE_S:
+        raise InputError(
+            f"--cycle-time is {quoted(text)}, expected {float(SHORTEST_CYCLE_S) * 1e3:g} ms to "
+            f"{float(LONGEST_CYCLE_S):g} s, the time between two calls of the function block"
+        )
+    return cycle_s
+
+
+def debounce_s(compensator: Compensator) -> Fraction:
+    """Return the debounce time that was asked for, s; where that was a number of samples, the time that they take."""
+    asked, signals = (compensator.options or {}).get("fault_debounce", ""), compensator.signals
+    if not asked or "sample" in asked:
+        return Fraction(compensator.drive_functions.fault_samples, signals.sample_Hz)
+    return _seconds(asked, "--fault-debounce")
+
+
+def _seconds(text: str, option: str) -> Fraction:
+    return Fraction(round(parse_quantity(text, "time", option) * PER_SECOND), PER_SECOND)
+
+
+def interface_named(name: str, compensator: Compensator, cycle_time: str = "") -> Interface:
+    """Return the scaling of an interface, ``plc`` or ``codes``, for a compensator, and its count of cycles."""
+    cycle_s = cycle_time_s(cycle_time)
     signals, functions = compensator.signals, compensator.drive_functions
     command, of_codes, full = signals.command, name == "codes", signals.compare_max if name == "codes" else FULL
     pairs = {sign: signals.pair(sign) for sign in signals.signs}
@@ -128,6 +173,7 @@ def interface_named(name: str, compensator: Compensator) -> Interface:
                 zero_band=units(compensator.zero_band_codes, sign),
                 transition=units(compensator.transition_codes, sign),
                 leave_zero=units(functions.leave_zero_codes, sign),
+                interlock=None if functions.interlock_codes is None else units(functions.interlock_codes, sign),
                 pair=pairs[sign].names,
                 weight=pairs[sign].weight if unit > 1 else 1,
                 codes_per_unit=per_unit(sign),
@@ -136,6 +182,7 @@ def interface_named(name: str, compensator: Compensator) -> Interface:
             )
             for sign in signals.signs
         },
+        fault_cycles=ceil(debounce_s(compensator) / cycle_s) if cycle_s else 0,
     )
 
 

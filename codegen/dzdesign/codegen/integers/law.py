@@ -11,19 +11,20 @@ it is made of limbs.
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 from dzdesign.codegen.core.integer_form import IntegerForm, Scaling, exact_reciprocal, integer_form
 from dzdesign.codegen.integers.form import Form, Limbs, Node
 from dzdesign.codegen.integers.interface import Interface, interface_named
 from dzdesign.codegen.telemetry.frame import beta_factor
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.signals import CODE_LIMIT
+from dzdesign.design.signals import CODE_LIMIT, SIDE_NAMES
 
 #: Function of each sign of command.
 FUNCTIONS = {1: "dz_comp", -1: "dz_comp_negative"}
 DINT = 2**31
-#: Bit of the status of a third pressure.
-PRESSURE_C = 512
+#: Bits of the status: a third pressure, and what lasts until a fault is over.
+PRESSURE_C, WAITING, HELD = 512, 32, 64
 LINEAR, HALF = "what the law takes of the command alone", "half a unit of the output, for it is rounded"
 #: Bits of the sum that are dropped at most: in limbs of 15 bits, two of them and one bit less than a third.
 MOST_DROPPED = 44
@@ -31,15 +32,29 @@ MOST_DROPPED = 44
 LEAST_DROPPED = 32
 
 
-def block_form(compensator: Compensator, interface_name: str) -> Form:
+def block_form(compensator: Compensator, interface_name: str, cycle_time: str = "") -> Form:
     """Return the operations of a function block, of all sides, in words of 32 bits."""
-    interface = interface_named(interface_name, compensator)
+    interface = interface_named(interface_name, compensator, cycle_time)
     return _Block(compensator, interface, tuple(interface.sides), 32).traced()
 
 
 def function_form(compensator: Compensator, sign: int) -> Form:
     """Return the operations of one side's function of converter codes, in words of 64 bits."""
     return _Function(compensator, interface_named("codes", compensator), (sign,), 64).traced()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Pressures:
+    """What the pressures come to."""
+
+    #: Pressure drop; whether it, or one of its pressures, can't be right; and the drop alone.
+    drop: Node
+    failed: Node
+    below: Node
+    #: Whether each pressure is not valid, by its name.
+    each_failed: Mapping[str, Node]
+    #: What the status says of command and pressures.
+    status: Node
 
 
 class _Law:
@@ -84,7 +99,7 @@ class _Law:
         return self.each(name, {sign: getattr(side, attribute) for sign, side in self.sides.items()}, meaning)
 
     def command(self, command: Node) -> tuple[Node, Node]:
-        """Return whether a command is valid, and how far it is from zero towards positive commands; 0 where not."""
+        """Return whether a command is valid, and how far it, or the valid one next to it, is from zero on."""
         interface = self.interface
         low = self.one("COMMAND_LOW", interface.command_low, "lowest valid command")
         high = self.one("COMMAND_HIGH", interface.command_high, "highest valid command")
@@ -95,10 +110,14 @@ class _Law:
         if interface.command_zero or direction < 0:
             zero = self.one("COMMAND_ZERO", interface.command_zero, "zero command")
             inside = inside - zero if direction > 0 else zero - inside
-        return valid, self.form.let("away", valid.choose(inside, 0), "command from zero on")
+        return valid, inside
 
-    def pressures(self, valid: Node, given: Mapping[str, Node], negative: Node | None = None) -> tuple[Node, Node]:
-        """Return the pressure drop, and whether the pressures can't be right; say in `status` what is not valid.
+    def away(self, followed: Node, inside: Node) -> Node:
+        """Return the command towards positive ones, or towards the only side; 0 of one that is not followed."""
+        return self.form.let("away", followed.choose(inside, 0), "command from zero on")
+
+    def pressures(self, valid: Node, given: Mapping[str, Node], negative: Node | None = None) -> _Pressures:
+        """Return the pressure drop, whether the pressures can't be right, and the status of what is not valid.
 
         The pressures that are `given` are all that the sides read; `negative` says which side is driven.
         """
@@ -133,13 +152,12 @@ class _Law:
             status = status + fault.as_number() * 2**place if fault else status
         if "C" in failed:
             status = status + failed["C"].as_number() * PRESSURE_C
-        self.form.let("status", status)
         implausible = self.form.let("failed", ~sound | below, "1 where the pressures can't be right: least beta")
         dp = difference.most(0)
         if unit != 1:
             told = "codes of the sensor ahead, rounded down"
             dp = self.form.let("dp", dp.over(unit), told)
-        return dp, implausible
+        return _Pressures(drop=dp, failed=implausible, below=below, each_failed=failed, status=status)
 
     def _of_driven(self, each: Mapping[str, Node], negative: Node | None, what: str) -> list[Node]:
         """Return what belongs to the inputs ahead and behind: of the driven side, where the two sides' differ."""
@@ -302,20 +320,30 @@ class _Block(_Law):
         command = form.input("command", -DINT, DINT - 1)
         given = {name: form.input(f"pressure_{name.lower()}", -DINT, DINT - 1) for name in self.interface.pressures}
         form.heading("Command, from zero on; zero where it is not valid.")
-        valid, away = self.command(command)
-        towards, negative, driven = self._side(valid, away) if both else (away, None, valid)
+        valid, inside = self.command(command)
+        followed = valid
+        if self.interface.fault_cycles:
+            inside = form.let("limited", inside, "the command, or the valid one next to it, from zero on")
+            followed = self._followed(valid, inside)
+        away = self.away(followed, inside)
+        towards, negative, driven = self._side(followed, away) if both else (away, None, followed)
         if self.interface.name == "codes" or both:
             towards = towards.least(self.side_field("COMMAND_SPAN", "span", "full command, from zero on"))
         towards = form.let("towards", towards.most(0), "command towards the driven side")
         if self.compensator.zero_band_codes:
-            before = form.input("at_rest", 0, 1, boolean=True)
+            before = form.memory("at_rest", 0, 1, 1, "whether the command counts as zero", boolean=True)
             rests = (towards <= self.band()) | (before & (towards <= self.leave()))
             at_rest = form.let("at_rest", rests, "whether the command counts as zero")
             towards = form.let("asked", at_rest.choose(0, towards), "command that the law is given")
         form.heading("Pressure drop; where it can't be right the smallest beta is taken.")
-        dp, failed = self.pressures(valid, given, negative)
+        found = self.pressures(valid, given, negative)
+        failed, status = found.failed, found.status
+        if self.interface.fault_cycles:
+            failed = self._held(found, negative)
+            status = status + (~followed).as_number() * WAITING + failed.as_number() * HELD
+        form.let("status", status)
         form.heading("Eq. (7), beta: straight between its nodes.")
-        betas = self.betas(dp, failed)
+        betas = self.betas(found.drop, failed)
         form.heading("The law: a sum of products, in limbs of 15 bits.")
         drive = self.output(towards, betas)
         if negative is None:
@@ -326,18 +354,77 @@ class _Block(_Law):
         form.outputs = ("output_a", *(("output_b",) if both else ()), "status")
         return form
 
+    def _followed(self, valid: Node, inside: Node) -> Node:
+        """Count the valid commands in a row, of zero command until it is followed; return whether it is."""
+        first = 0 if self._has_interlock else self.interface.fault_cycles
+        before, needed = self._cycles("valid_commands", first, "valid commands in a row")
+        good = valid
+        if self._has_interlock:
+            enable = self.form.input("enable", 0, 1, boolean=True)
+            zero = inside <= self._interlock(self.signs[0])
+            if len(self.signs) == 2:
+                zero = zero & (-inside <= self._interlock(self.signs[1]))
+            told = "whether the command is good: valid, and of zero command before it is followed"
+            good = self.form.let("good", valid & enable & (zero | (needed <= before)), told)
+        count = self._counted("valid_commands", good, before, needed)
+        return self.form.let("followed", needed <= count, "whether the command is followed")
+
+    def _interlock(self, sign: int) -> Node:
+        """Return the largest command of a side that the interlock takes for zero command."""
+        numbers = {each: side.interlock or 0 for each, side in self.sides.items()}
+        made = self.each("INTERLOCK", numbers, "the interlock takes a command up to this for zero command")
+        return made.operands[0].of(made.number(self.signs.index(sign))) if made.operation == "of" else made
+
+    @property
+    def _has_interlock(self) -> bool:
+        return self.sides[self.signs[0]].interlock is not None
+
+    def _held(self, found: _Pressures, negative: Node | None) -> Node:
+        """Count the cycles in a row in which a side's pressures can be right; return whether they are not yet used.
+
+        Where the two sides read different pressures each has its count; of the side that is not driven only the
+        sensors count, as no flow makes its pressure drop.
+        """
+        if negative is None or not self.interface.three:
+            counts = [self._of_pressures("valid_pressures", found.failed, "pressures that can be right, in a row")]
+        else:
+            counts = []
+            for sign, driven in ((1, ~negative), (-1, negative)):
+                one, other = (found.each_failed[name] for name in self.sides[sign].pair)
+                name = SIDE_NAMES[sign]
+                told = f"pressures of {name} commands that can be right, in a row"
+                counts.append(self._of_pressures(f"valid_{name}", one | other | (found.below & driven), told))
+        count = counts[0] if len(counts) == 1 or negative is None else negative.choose(counts[1], counts[0])
+        needed = self.one("FAULT_CYCLES", self.interface.fault_cycles, "")
+        return self.form.let("held", count < needed, "whether the pressures are not used: least beta")
+
+    def _of_pressures(self, name: str, failed: Node, meaning: str) -> Node:
+        before, needed = self._cycles(name, self.interface.fault_cycles, meaning)
+        return self._counted(name, ~failed, before, needed)
+
+    def _cycles(self, name: str, first: int, meaning: str) -> tuple[Node, Node]:
+        """Return a count of cycles as the last call left it, and the one that ends a fault."""
+        cycles = self.interface.fault_cycles
+        needed = self.one("FAULT_CYCLES", cycles, "so many good cycles in a row end a fault")
+        return self.form.memory(name, 0, cycles, first, f"{meaning}, counted up to FAULT_CYCLES"), needed
+
+    def _counted(self, name: str, good: Node, before: Node, needed: Node) -> Node:
+        return self.form.let(name, good.choose((before + 1).least(needed), 0))
+
     def leave(self) -> Node:
         """Return the command beyond which zero is left."""
         return self.side_field("LEAVE_ZERO", "leave_zero", "a command beyond this leaves zero")
 
-    def _side(self, valid: Node, away: Node) -> tuple[Node, Node, Node]:
+    def _side(self, followed: Node, away: Node) -> tuple[Node, Node, Node]:
         """Follow the driven side; return the command towards it, and whether it is the negative or the positive one."""
-        form, before = self.form, self.form.input("side", -1, 1)
+        form = self.form
+        before = form.memory("side", -1, 1, 0, "driven side, 1 or -1; 0: none before the command has left zero")
         first = second = self.leave()
         if first.operation == "of":
             second = first.operands[0].of(away.number(1))
         kept = (away < -second).choose(-1, before)
-        side = form.let("side", valid.choose((away > first).choose(1, kept), 0), "driven side, 1 or -1; 0: none yet")
+        chosen = followed.choose((away > first).choose(1, kept), 0)
+        side = form.let("side", chosen, "driven side, 1 or -1; 0: none yet")
         negative = form.let("negative", side < 0, "whether the negative side is driven")
         self.row = form.let("k", negative.as_number(), "place of the driven side's numbers")
         return negative.choose(-away, away), negative, side > 0
@@ -352,13 +439,15 @@ class _Function(_Law):
         u = form.input("u", 0, CODE_LIMIT)
         given = {name: form.input(f"p_{name.lower()}", 0, CODE_LIMIT) for name in self.sides[sign].pair}
         form.heading("Command, in codes from zero on; zero where it is not valid.")
-        valid, away = self.command(u)
+        valid, inside = self.command(u)
+        away = self.away(valid, inside)
         span = self.side_field("COMMAND_SPAN", "span", "full command, from zero on")
         towards = form.let("towards", away.most(0).least(span), "command towards this side")
         form.heading("Pressure drop; where it can't be right the smallest beta is taken.")
-        dp, failed = self.pressures(valid, given)
+        found = self.pressures(valid, given)
+        form.let("status", found.status)
         form.heading("Eq. (7), beta: straight between its nodes.")
-        betas = self.betas(dp, failed)
+        betas = self.betas(found.drop, found.failed)
         form.heading("The law.")
         form.let("compare", valid.choose(self.output(towards, betas), 0))
         numbers, step = self.numbers[sign], self.compensator.beta_step_codes

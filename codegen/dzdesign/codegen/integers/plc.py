@@ -13,9 +13,17 @@ from xml.etree.ElementTree import Element, SubElement
 
 from dzdesign.codegen.banner import lot_in_words
 from dzdesign.codegen.integers.form import Form, Node
-from dzdesign.codegen.integers.interface import Interface, interface_named
+from dzdesign.codegen.integers.interface import Interface, cycle_time_s, debounce_s, interface_named
 from dzdesign.codegen.integers.law import block_form
-from dzdesign.codegen.integers.text import COLUMNS, rendered, st_body, st_constants, st_variables
+from dzdesign.codegen.integers.text import (
+    COLUMNS,
+    first_value,
+    rendered,
+    st_body,
+    st_constants,
+    st_remembered,
+    st_variables,
+)
 from dzdesign.core.errors import InputError
 from dzdesign.core.version import __version__
 from dzdesign.design.compensator import Compensator
@@ -26,8 +34,8 @@ from dzdesign.design.signals import SIDE_NAMES
 NAME = "FB_DeadZone"
 TEMPLATE = f"{NAME}.st.jinja"
 END = "END_FUNCTION_BLOCK\n"
-#: Of what the block remembers.
-FIRST_VALUES = {"side": "0", "at_rest": "TRUE"}
+#: What a block has that counts cycles.
+COUNTED = ("debouncing of faults", "interlock")
 NAMESPACE = "http://www.plcopen.org/xml/tc6_0200"
 XHTML = "http://www.w3.org/1999/xhtml"
 PLAIN_TEXT = "http://www.3s-software.com/plcopenxml/interfaceasplaintext"
@@ -44,8 +52,8 @@ def output_files(compensator: Compensator, origin: FirmwareOrigin, settings: Map
             "the compensator controls the current, which a function block can't at a PLC's cycle; design it again "
             "with --drive duty, or let the PLC's output or the amplifier control the current"
         )
-    form = block_form(compensator, settings["interface"])
-    text = structured_text(compensator, origin.compensator_json, settings["interface"], form)
+    chosen = settings["interface"], settings["cycle_time"]
+    text, form = structured_text(compensator, origin.compensator_json, *chosen), block_form(compensator, *chosen)
     files = {f"{NAME}.st": text.encode(), f"{NAME}.xml": _plcopen_xml(text, form)}
     if settings["dialect"] == "twincat":
         files[f"{NAME}.TcPOU"] = _tcpou_xml(text)
@@ -54,37 +62,38 @@ def output_files(compensator: Compensator, origin: FirmwareOrigin, settings: Map
 
 def note_of(compensator: Compensator, settings: Mapping[str, str]) -> str:
     """Return what of a design a function block has not; empty where it has all of it."""
-    del settings  # whichever they are
-    left_out = ", ".join(left_out_of(compensator))
+    left_out = ", ".join(_not_in_block(compensator, settings["cycle_time"]))
     return f"the function block leaves out, of this design: {left_out}" if left_out else ""
 
 
-def structured_text(compensator: Compensator, digest: str, interface_name: str, form: Form | None = None) -> str:
+def structured_text(compensator: Compensator, digest: str, interface_name: str, cycle_time: str = "") -> str:
     """Return the function block of a compensator whose file has this SHA-256."""
-    interface, form = interface_named(interface_name, compensator), form or block_form(compensator, interface_name)
+    interface = interface_named(interface_name, compensator, cycle_time)
+    form = block_form(compensator, interface_name, cycle_time)
     of_codes = interface.name == "codes"
     return rendered(
         TEMPLATE,
         compensator,
         digest,
-        header=_header(compensator, interface),
+        header=_header(compensator, interface, cycle_time),
         bipolar=len(interface.sides) == 2,
-        has_rest=compensator.zero_band_codes > 0,
-        first=FIRST_VALUES,
+        enabled=any(each.name == "enable" for each in form.inputs),
+        counts=interface.fault_cycles > 0,
         command_text="converter code of the command" if of_codes else "0.01 % of full command, -10000 to 10000",
         pressure_text="codes of the pressures" if of_codes else "0.1 bar",
         pressures=", ".join(f"pressure_{name.lower()}" for name in interface.pressures),
         edges=_edges(interface),
-        three="C" in interface.pressures,
+        three=interface.three,
         output_text=f"compare value, full duty {interface.full}" if of_codes else "0.01 % of full drive",
         constants=st_constants(form),
+        remembered=st_remembered(form),
         variables=st_variables(form),
         body=st_body(form),
     )
 
 
-def _header(compensator: Compensator, interface: Interface) -> list[str]:
-    """Return what the header says: how numbers are rounded, what is certified, and what the block leaves out."""
+def _header(compensator: Compensator, interface: Interface, cycle_time: str) -> list[str]:
+    """Return what the header says: rounding, certificate, cycles of a fault, and what the block leaves out."""
     lines: list[str] = []
     if interface.name == "plc":
         lines += wrap(
@@ -96,10 +105,33 @@ def _header(compensator: Compensator, interface: Interface) -> list[str]:
         lines.append("Codes and compare values are those of the C, number for number.")
     lines += wrap(_certificate(compensator), COLUMNS - 3)
     lines += wrap(what_machine_switches(compensator), COLUMNS - 3)
+    lines += wrap(_cycles(compensator, interface, cycle_time), COLUMNS - 3)
     left_out = "Not in it: current control and telemetry"
-    if chosen := left_out_of(compensator):
+    if chosen := _not_in_block(compensator, cycle_time):
         left_out += f"; nor, though this design has them: {', '.join(chosen)}"
     return lines + wrap(f"{left_out}.", COLUMNS - 3)
+
+
+def _cycles(compensator: Compensator, interface: Interface, cycle_time: str) -> str:
+    """Return what a fault does and when it is over; empty without a cycle time."""
+    cycle_s, cycles = cycle_time_s(cycle_time), interface.fault_cycles
+    if cycle_s is None:
+        return ""
+    lasts_ms, asked_ms = (1e3 * float(each) for each in (cycles * cycle_s, debounce_s(compensator)))
+    in_a_row = "a valid cycle" if cycles == 1 else f"{cycles} valid cycles in a row"
+    text = (
+        f"Call it every {cycle_time}. A fault acts at once: an invalid command switches the output off, pressures that "
+        f"can't be right select the smallest beta. It is over with {in_a_row}, {lasts_ms:g} ms (asked for: "
+        f"{asked_ms:g} ms)."
+    )
+    bands = [side.interlock for side in interface.sides.values() if side.interlock is not None]
+    if not bands:
+        return text
+    zeros = [f"{band / 100:g} %" if interface.name == "plc" else f"{band} codes" for band in dict.fromkeys(bands)]
+    return (
+        f"{text} Interlock: after a start, an invalid command or enable = FALSE the output stays off until, with "
+        f"enable = TRUE, the command has been zero, within {' and '.join(zeros)}, for as many cycles in a row."
+    )
 
 
 def _certificate(compensator: Compensator) -> str:
@@ -125,16 +157,21 @@ def _edges(interface: Interface) -> str:
     return ", ".join(f"{ahead} ahead and {behind} behind at {side} commands" for side, (ahead, behind) in sides.items())
 
 
+def _not_in_block(compensator: Compensator, cycle_time: str) -> list[str]:
+    """Return what of a design a function block has not."""
+    return [name for name in left_out_of(compensator) if not (cycle_time and name in COUNTED)]
+
+
 def left_out_of(compensator: Compensator) -> list[str]:
-    """Return the drive functions that the compensator has and the block has not."""
+    """Return the drive functions that the compensator has and the law alone has not."""
     functions = compensator.drive_functions
     found = [
         ("dither", functions.dither_counts > 0),
         ("ramps of the command", functions.has_ramp),
         ("play of a falling command", functions.has_play),
-        ("debouncing of faults", functions.fault_samples > 1),
+        (COUNTED[0], functions.fault_samples > 1),
         ("latching of faults", functions.fault_latch),
-        ("interlock", functions.interlock_codes is not None),
+        (COUNTED[1], functions.interlock_codes is not None),
     ]
     return [name for name, there in found if there]
 
@@ -191,9 +228,8 @@ def _variable(node: Node) -> Element:
             SubElement(SubElement(values, "value"), "simpleValue", value=str(value))
         return variable
     SubElement(place, kind)
-    start = FIRST_VALUES.get(node.name) if node.operation == "input" else "".join(map(str, node.values))
-    if start:
-        SubElement(SubElement(variable, "initialValue"), "simpleValue", value=start)
+    if node.values:
+        SubElement(SubElement(variable, "initialValue"), "simpleValue", value=first_value(node))
     return variable
 
 

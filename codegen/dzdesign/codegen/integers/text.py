@@ -90,6 +90,21 @@ def st_constants(form: Form) -> list[str]:
     return lines
 
 
+def st_remembered(form: Form) -> list[str]:
+    """Return the declarations of what is remembered, each with its first value."""
+    lines: list[str] = []
+    for each in form.remembered:
+        kind = "BOOL" if each.boolean else "DINT"
+        lines += _with_comment(f"{each.name} : {kind} := {first_value(each)};", each.meaning)
+    return lines
+
+
+def first_value(node: Node) -> str:
+    """Return the first value of what is remembered."""
+    (value,) = node.values
+    return str(bool(value)).upper() if node.boolean else str(value)
+
+
 def st_variables(form: Form) -> list[str]:
     """Return the declarations of what the lines assign, beside outputs and what is remembered."""
     lines: list[str] = []

@@ -3,7 +3,8 @@
 import logging
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import final
@@ -51,6 +52,8 @@ SET_BACK = {
 }
 #: Times of day of a recording that begins within so many seconds after midnight are counted from its own beginning.
 ELAPSED = 1.0
+#: By so much a column of dates may depart from the clock that it runs with: stamps of whole seconds, s.
+WHOLE_SECONDS = 2.0
 logger = logging.getLogger(__name__)
 
 
@@ -238,6 +241,27 @@ def read_clock(table: Table, column: Column, u_max: float, no_numbers: Sequence[
         label=label, seconds=numbers, stamp=table.started(label), counts=True, has_unit=bool(column.unit),
         missing=table.marked.get(label, Missing()) + placeholders,
     )  # fmt: skip
+
+
+def stamp_beside(table: Table, label: str, seconds: np.ndarray) -> Start | None:
+    """Return when a column that counts time is zero, by dates and times in another one; None where no such is found.
+
+    `seconds` are the column's times, (N,), NaN where one is missing. The dates must run with them: one of a calibration
+    or of an export stands still, and would give the recordings a false order.
+    """
+    for other in table.labels:
+        if other == label:
+            continue
+        with suppress(InputError):  # a column that nobody chose may hold anything
+            if not table.is_clock(other):
+                continue
+            stamps, start = read_times_of_day(table, table.dated(other))
+            if start is None or stamps.size != seconds.size:
+                continue
+            later = (stamps - seconds)[np.isfinite(stamps - seconds)]
+            if later.size and np.ptp(later) <= WHOLE_SECONDS:
+                return replace(start, seconds=start.seconds + float(np.median(later)))
+    return None
 
 
 def read_times_of_day(table: Table, label: str) -> tuple[np.ndarray, Start | None]:

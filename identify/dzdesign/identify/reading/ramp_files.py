@@ -18,7 +18,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.core.units import NUMBER
 from dzdesign.identify.reading.binary_table import read_table
 from dzdesign.identify.reading.channel_clocks import lay_on_one_clock, refuse_an_early_end
-from dzdesign.identify.reading.clock import ASSUMED_MS, Clock, doubt_of_clock, never_back, read_clock
+from dzdesign.identify.reading.clock import ASSUMED_MS, Clock, doubt_of_clock, never_back, read_clock, stamp_beside
 from dzdesign.identify.reading.column_labels import PRESSURES, Column
 from dzdesign.identify.reading.columns import find_columns
 from dzdesign.identify.reading.metering_edge import metering_edge, side_without_dp
@@ -164,6 +164,7 @@ def _ramp_test(
     time, u, q, *drop = (np.array(column) for column in thinned.rows)
     doubt = doubt_of_clock(table.path, clock, rows[0], time, u) if clock else ""
     in_ms = 1e3 if doubt == ASSUMED_MS else 1.0
+    stamp = clock and (clock.stamp or stamp_beside(table, clock.label, clock.seconds / in_ms))
     return RampTest(
         source=table.path.name.encode(errors="replace").decode(),
         sha256=sha256,
@@ -179,8 +180,8 @@ def _ramp_test(
         clock_doubt=doubt,
         simulated=MARKED.search(table.comments) is not None,
         missing=missing,
-        stamp=clock.stamp if clock else None,
-        started=clock.stamp.seconds if clock and clock.stamp else None,
+        stamp=stamp,
+        started=stamp.seconds if stamp else None,
         q_range=scalings["Q"].ends,
         unseen=(float(without_flow.min(initial=0.0)), float(without_flow.max(initial=0.0))),
         units=units,

@@ -25,10 +25,8 @@ Curves = Mapping[str, np.ndarray]
 KEPT_RECORD = 20
 #: Decimals of a flow, L/min: the plant is no better known.
 FLOW_DIGITS = 3
-#: Names of the files of a side, ``positive`` or ``negative``: ramps, compare values, drive at zero command.
-closed_loop_name, input_map_name, zero_command_name = (
-    f"{what}_{{}}.csv".format for what in ("closed_loop", "input_map", "zero_command")
-)
+#: Names of the files of a side, ``positive`` or ``negative``: ramps, drive at zero command.
+closed_loop_name, zero_command_name = "closed_loop_{}.csv".format, "zero_command_{}.csv".format
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

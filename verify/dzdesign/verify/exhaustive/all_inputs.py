@@ -20,7 +20,7 @@ from dzdesign.design.lot_setting import NAMED
 from dzdesign.design.lot_valves import LotSide
 from dzdesign.identify.valve.guard_curve import AboveTests
 from dzdesign.verify import requirements
-from dzdesign.verify.closed_loop.ramps import Curves, input_map_name, zero_command_name
+from dzdesign.verify.closed_loop.ramps import Curves, zero_command_name
 from dzdesign.verify.evidence import AboveCheck, InputCheck, InputCounts, LotCheck, OutputChecks, TriedInputs
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import Differences, PreparedInputs
@@ -38,9 +38,6 @@ from dzdesign.verify.toolchain.compiled_core import CompiledCore, Findings
 
 #: Place of the requirement on what lies above the tests.
 AFTER_ZERO_COMMAND = 3
-#: Columns of the drawn grid over the converter's codes; rows over all differences, and over the tested ones and a share
-#: of their width beyond.
-COMMANDS, WIDE_ROWS, TESTED_ROWS, BEYOND = 46, 36, 54, 0.15
 
 
 def check_all_inputs(folder: Path, sign: int = 1, compensator: Compensator | None = None) -> InputCheck:
@@ -61,7 +58,7 @@ def every_input(folder: Path, sign: int, compensator: Compensator) -> tuple[Inpu
     prepared = PreparedInputs(ExactLaw(compensator, sign))
     core = CompiledCore(folder, sign)
     found = core.check(prepared.everything())
-    return input_check(prepared, core.sha256, found), map_inputs(prepared, found.at_zero)
+    return input_check(prepared, core.sha256, found), drives_at_zero(prepared, found.at_zero)
 
 
 def input_check(prepared: PreparedInputs, core_sha256: str, found: Findings) -> InputCheck:
@@ -288,29 +285,20 @@ def lot_checked(inputs: Sequence[InputCheck], compensator: Compensator) -> list[
     return [LOT.check(holds=not over and all_there, text=text)]
 
 
-def map_inputs(prepared: PreparedInputs, at_zero: np.ndarray) -> dict[str, Curves]:
-    """Return what one side of the core gives, by the file's name, to be drawn.
+def drives_at_zero(prepared: PreparedInputs, at_zero: np.ndarray) -> dict[str, Curves]:
+    """Return what one side of the core gives at zero command, by the file's name, to be drawn.
 
-    The grid: command code, difference of pressure codes, compare value and status word, as the exact law has them, with
-    which every one was compared. At zero command, at every difference of the tested interval: its code, pressure drop,
-    the drive with a dither's peak that the recordings lack, and the lower bound of the threshold. `at_zero` are the
-    compare values that the check of all inputs found there.
+    At every difference of the tested interval: its code, pressure drop, the drive with a dither's peak that the
+    recordings lack, and the lower bound of the threshold. `at_zero` are the compare values that the check of all inputs
+    found there.
     """
     exact, found = prepared.exact, prepared.differences
     compensator, bounds = exact.compensator, guarded_bounds(exact.compensator, exact.sign)
     known_V = bounds_at(pressure_drops(exact, found, (Fraction(repr(dp)) for dp in bounds.dp_MPa)), bounds)
     tested = np.flatnonzero(~np.isnan(known_V))
-    commands, rows = _commands(exact), _grid_rows(found, tested).tolist()
-    answers = [exact.answer(code, *_pair(exact, found, row)) for row in rows for code in commands]
     a_MPa = float(exact.ahead.per_code_MPa)
     volt = float(compensator.u_max_V) / exact.compare_max
     return {
-        input_map_name(exact.side): {
-            "command_code": np.tile(commands, len(rows)),
-            "dp_code": np.repeat(found.values[rows], len(commands)),
-            "compare": np.array([each.compare for each in answers]),
-            "status": np.array([each.status for each in answers]),
-        },
         zero_command_name(exact.side): {
             "dp_code": found.values[tested],
             "dp_MPa": (found.values[tested] * a_MPa).round(4),
@@ -318,27 +306,3 @@ def map_inputs(prepared: PreparedInputs, at_zero: np.ndarray) -> dict[str, Curve
             "bound_V": known_V[tested].round(5),
         },
     }
-
-
-def _commands(exact: ExactLaw) -> list[int]:
-    """Return codes over the converter's range, zero and full command among them."""
-    spread = np.linspace(0, exact.code_max, COMMANDS).round().astype(int).tolist()
-    return sorted({*spread, exact.zero, exact.full})
-
-
-def _grid_rows(found: Differences, tested: np.ndarray) -> np.ndarray:
-    """Return places of differences that sound codes make: over all of them, and closer over the tested ones."""
-    made = np.flatnonzero(found.made)
-    wide = made[np.linspace(0, made.size - 1, WIDE_ROWS).round().astype(int)]
-    if tested.size == 0:
-        return np.unique(wide)
-    room = BEYOND * (tested[-1] - tested[0] + 1)
-    close = np.linspace(tested[0] - room, tested[-1] + room, TESTED_ROWS).round().astype(int)
-    near = found.values[np.clip(close, made[0], made[-1])] - found.values[0]
-    return np.unique([*wide, *(row for row in near if found.made[row])])
-
-
-def _pair(exact: ExactLaw, found: Differences, row: int) -> tuple[int, int]:
-    """Return a pair of sound pressure codes that makes a difference."""
-    b = int(found.b_first[row])
-    return int(found.values[row] + found.slant[b]), b

@@ -14,6 +14,7 @@ whether each of its pressures is a sound signal.
 from dataclasses import dataclass, field
 from fractions import Fraction
 from math import floor
+from typing import Any
 
 from dzdesign.design.compensator import Compensator
 from dzdesign.verify.exhaustive.exact_law import PRESSURES
@@ -26,35 +27,31 @@ WAITING, HELD, LATCHED = 32, 64, 128
 
 @dataclass
 class FaultMemory:
-    """The memory of one channel: the command, or the pressures together."""
+    """The memory of one channel, the command or the pressures together: numbers, or arrays of many drives."""
 
     #: Declared: samples of debounce, and whether faults are latched.
     needed: int
     latches: bool
     #: Sound samples in a row up to now, no more than needed; and faulty ones since the channel was last used.
-    sound: int
-    faulty: int = 0
+    sound: Any
+    faulty: Any = 0
 
     @property
-    def usable(self) -> bool:
+    def usable(self) -> Any:
         """Whether the channel is used."""
         return self.sound == self.needed
 
     @property
-    def is_latched(self) -> bool:
+    def is_latched(self) -> Any:
         """Whether only a reset helps."""
-        return self.latches and self.faulty == self.needed
+        return self.latches & (self.faulty == self.needed)
 
-    def take(self, *, fault: bool, unwanted: bool = False) -> None:
+    def take(self, *, fault: Any, unwanted: Any = False) -> None:
         """Take a sample; one that is sound but `unwanted` is not a fault, and ends a row of sound ones like one."""
-        if fault and self.latches and self.faulty < self.needed:
-            self.faulty += 1
-        if fault or unwanted or self.is_latched:
-            self.sound = 0
-        elif self.sound < self.needed:
-            self.sound += 1
-        if self.usable:
-            self.faulty = 0
+        self.faulty = self.faulty + (fault & self.latches & (self.faulty < self.needed))
+        ended = fault | unwanted | self.is_latched
+        self.sound = (self.sound + (self.sound < self.needed)) * (1 - ended)
+        self.faulty = self.faulty * (1 - self.usable)
 
 
 def command_counts_as_zero(compensator: Compensator, away: int) -> bool:

@@ -1,8 +1,9 @@
 """Every input of a program, such as a function block, and what comes of it beside the exact law.
 
 The law comes as straight parts along the command, in whole numbers, for each pressure drop; its outputs are made by
-additions alone, of many pressure drops at once. What a block remembers, the driven side and whether the command counts
-as zero, is followed here from its description. Commands and pressures are arrays that broadcast against each other.
+additions alone, of many pressure drops at once. What a block remembers, the driven side, whether the command counts as
+zero and good cycles in a row, is followed here from its description. Inputs are arrays that broadcast against each
+other.
 """
 
 import os
@@ -16,13 +17,14 @@ from typing import TypeVar
 import numpy as np
 
 from dzdesign.design.compensator import Compensator
+from dzdesign.verify.exhaustive.exact_drive import HELD, WAITING, FaultMemory
 from dzdesign.verify.exhaustive.exact_law import PRESSURES
 from dzdesign.verify.outputs.exact_block import ExactBlock
 
 #: Inputs by name -> outputs and what is remembered, by name.
 Program = Callable[[Mapping[str, np.ndarray]], Mapping[str, np.ndarray]]
-#: The driven side and whether the command counts as zero, as a call begins.
-State = tuple[np.ndarray, np.ndarray]
+#: What is remembered as a call begins, and whether the block is enabled, by the names of the variables.
+State = Mapping[str, np.ndarray]
 #: Pressures by the names of their inputs.
 Pressures = Mapping[str, np.ndarray]
 Piece = TypeVar("Piece")
@@ -74,8 +76,8 @@ class _Law:
         drops: np.ndarray = np.floor_divide(weighted, self.exact.unit)
         return drops
 
-    def rows(self, pressures: Pressures) -> tuple[np.ndarray, np.ndarray]:
-        """Return the rows of the law that pressures ask for, and what the status says of all of them."""
+    def rows(self, pressures: Pressures) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the rows of the law that pressures ask for, what the status says of all, and whether any is sound."""
         exact, ends = self.exact, self.exact.numbers
         failed = {name: (each < ends[name].low) | (each > ends[name].high) for name, each in pressures.items()}
         ahead, behind = (np.asarray(pressures[name], np.int64) for name in exact.pair)
@@ -83,7 +85,7 @@ class _Law:
         below, above = sound & (drop < -exact.reverse), sound & (drop > exact.tested_to)
         status = sum((PRESSURES[name] * each for name, each in failed.items()), start=8 * below + 16 * above)
         last = len(self.table) - 1
-        return np.where(sound & ~below, np.clip(drop + self.exact.reverse, 0, last), last), status
+        return np.where(sound & ~below, np.clip(drop + self.exact.reverse, 0, last), last), status, sound
 
     def outputs(self, rows: np.ndarray) -> np.ndarray:
         """Return the outputs at every command from zero to full, (commands, rows)."""
@@ -115,16 +117,34 @@ class _Law:
         return a, b
 
 
-#: Outputs of one side at all commands that are known beforehand, (commands, pressures).
-Known = tuple[_Law, np.ndarray] | None
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Known:
+    """Outputs at all commands that are known beforehand."""
+
+    #: Of a side by its place: (commands, pressures), the last column of pressures that can't be right.
+    outputs: Mapping[int, np.ndarray]
+    #: Column of each of the inputs' pressures; None: they are the columns in their order, those that can't be right are
+    #: the only ones that are not used, and each row has one command.
+    columns: np.ndarray | None = None
+
+    def at(self, place: int, towards: np.ndarray, held: np.ndarray) -> np.ndarray:
+        """Return the outputs of a side at commands towards the driven one, of pressures that are used or `held`."""
+        outputs = self.outputs[place]
+        last, towards = outputs.shape[1] - 1, np.minimum(towards, len(outputs) - 1)
+        if self.columns is None:
+            found: np.ndarray = outputs[towards[:, 0], :last]
+        else:
+            found = outputs[towards, np.where(held, last, self.columns)]
+        return found
 
 
 class EveryPair:
     """A program, ready to be tried; one of a single side that remembers nothing has no states."""
 
     def __init__(
-        self, compensator: Compensator, interface: str, signs: Sequence[int], *, remembers: bool, at_once: int = AT_ONCE
-    ) -> None:
+        self, compensator: Compensator, interface: str, signs: Sequence[int], *, remembers: bool, cycles: int = 0,
+        at_once: int = AT_ONCE,
+    ) -> None:  # fmt: skip
         self.laws = [_Law(ExactBlock(compensator, sign, interface)) for sign in signs]
         self.both, self.remembers, first = len(signs) == 2, remembers, self.laws[0].exact
         self.exact, self.of_codes = first, interface == "codes"
@@ -135,8 +155,26 @@ class EveryPair:
         #: What may be remembered: driven side and whether at rest; a new instance's first.
         sides, rests = (0, 1, -1) if self.both else (1,), (1, 0) if self.rests else (1,)
         self.states = [(side, rest) for side in sides for rest in rests]
+        #: Good cycles in a row that end a fault, 0 for a block that judges each by itself; and what counts them.
+        self.cycles, self.interlock = cycles, cycles > 0 and first.interlock is not None
+        self.three = len(self.inputs) > 2
+        of_pressures = [f"valid_{law.exact.side}" for law in self.laws] if self.three else ["valid_pressures"]
+        self.counts = ["valid_commands", *of_pressures] if cycles else []
         self.at_once = at_once
         self.low, self.high = (0, first.code_max) if self.of_codes else PLC_PRESSURES
+
+    def first(self) -> dict[str, int | bool]:
+        """Return what a new block remembers: with an interlock zero command must be seen first."""
+        first: dict[str, int | bool] = {"side": 0} if self.both else {}
+        first |= {"at_rest": True} if self.rests else {}
+        return first | {name: 0 if name == "valid_commands" and self.interlock else self.cycles for name in self.counts}
+
+    def state(self, side: np.ndarray, rest: np.ndarray) -> dict[str, np.ndarray]:
+        """Return a state of an enabled block that remembers no fault."""
+        state = {"side": side} if self.both else {}
+        state |= {"at_rest": rest == 1} if self.rests else {}
+        state |= {"enable": np.array(True)} if self.interlock else {}
+        return state | {name: np.array(self.cycles) for name in self.counts}
 
     def every_command(self, program: Program, place: int, drops: range | None = None) -> Tried:
         """Try every command of one side at every difference of pressures, or at some."""
@@ -157,7 +195,7 @@ class EveryPair:
             rows = max(self.at_once // b.size, 1)
             of_a = np.arange(low, high + 1, stride)
             pieces = [of_a[begin : begin + rows, None] for begin in range(0, of_a.size, rows)]
-            state, law = (np.array(side), np.array(rest == 1)), self.laws[-1 if side < 0 else 0]
+            state, law = self.state(np.array(side), np.array(rest)), self.laws[-1 if side < 0 else 0]
             found.append(self._all(partial(self._at_zero_command, program, law, b, state), pieces))
         random = np.random.default_rng(SEED)
         commands = np.arange(self.exact.commands[0], self.exact.commands[1] + 1, STRIDE)
@@ -167,7 +205,7 @@ class EveryPair:
         return [at_zero, *(self._swept(program, law, commands, *sample) for law in self.laws)]
 
     def _at_zero_command(self, program: Program, law: _Law, b: np.ndarray, state: State, a: np.ndarray) -> Tried:
-        return self._judged(program, np.array(self.exact.command_zero), self.with_other(law, a, b), state)
+        return self.judged(program, np.array(self.exact.command_zero), self.with_other(law, a, b), state)
 
     def with_other(self, law: _Law, ahead: np.ndarray, behind: np.ndarray) -> Pressures:
         """Return a side's pressures, and beside them any of the input that it does not read, if there is one."""
@@ -188,14 +226,15 @@ class EveryPair:
         grid = np.array(np.meshgrid(commands, *pressures)).reshape(1 + len(pressures), -1)
         grid = grid[:, (grid >= ends[0]).all(axis=0)]
         given = dict(zip(self.inputs, grid[1:], strict=True))
-        each = [self._judged(program, grid[0], given, (np.array(side), np.array(rest == 1)))
+        each = [self.judged(program, grid[0], given, self.state(np.array(side), np.array(rest)))
                 for side, rest in self.states]  # fmt: skip
         return reduce(Tried.and_then, each)
 
     def at_zero(self, program: Program, place: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Return the outputs at zero command with one side driven."""
         sign, given = self.laws[place].exact.sign, self.with_other(self.laws[place], a, b)
-        found = program(self._given(np.array(self.exact.command_zero), given, (np.array(sign), np.array(True))))
+        state = self.state(np.array(sign), np.array(1))
+        found = program(self.given(np.array(self.exact.command_zero), given, state))
         return np.broadcast_to(found["output_b" if self.both and sign < 0 else "output_a"], a.shape)
 
     def _swept(self, program: Program, law: _Law, commands: np.ndarray, a: np.ndarray, b: np.ndarray) -> Tried:
@@ -211,12 +250,12 @@ class EveryPair:
 
         def tried(piece: slice) -> Tried:
             given, found = self.with_other(law, a[piece], b[piece]), Tried()
-            known = law.outputs(law.rows(given)[0])
+            known = Known(outputs={self.laws.index(law): self.outputs(law, given)})
             rows = max(self.at_once // a[piece].size, 1)
             for begin in range(0, command.size, rows):
                 some = slice(begin, begin + rows)
-                state = (states[some, :1], states[some, 1:] == 1)
-                found = found.and_then(self._judged(program, command[some, None], given, state, (law, known)))
+                state = self.state(states[some, :1], states[some, 1:])
+                found = found.and_then(self.judged(program, command[some, None], given, state, known))
             return found
 
         return replace(self._all(tried, pieces), pairs=commands.size * a.size)
@@ -228,30 +267,39 @@ class EveryPair:
             found = list(pool.map(work, pieces))
         return reduce(Tried.and_then, found)
 
-    def _given(self, command: np.ndarray, pressures: Pressures, state: State) -> dict[str, np.ndarray]:
-        given = {"command": command, **{f"pressure_{name.lower()}": each for name, each in pressures.items()}}
-        given |= {"side": state[0]} if self.both else {}
-        given = {name: each.astype(np.int64) for name, each in given.items()}
-        return given | ({"at_rest": state[1]} if self.rests else {})
+    @staticmethod
+    def outputs(law: _Law, pressures: Pressures) -> np.ndarray:
+        """Return the outputs of a side at every command and some pressures, last of those that can't be right."""
+        return law.outputs(np.append(law.rows(pressures)[0], len(law.table) - 1))
 
-    def _judged(
-        self, program: Program, command: np.ndarray, pressures: Pressures, state: State, known: Known = None
+    @staticmethod
+    def given(command: np.ndarray, pressures: Pressures, state: State) -> dict[str, np.ndarray]:
+        """Return the inputs of a program, by the names of its variables."""
+        given = {"command": command, **{f"pressure_{name.lower()}": each for name, each in pressures.items()}, **state}
+        return {name: each if each.dtype == bool else each.astype(np.int64) for name, each in given.items()}
+
+    def judged(
+        self, program: Program, command: np.ndarray, pressures: Pressures, state: State, known: Known | None = None
     ) -> Tried:
         """Give a program some inputs, and compare all that it gives."""
-        found, expected = (
-            program(self._given(command, pressures, state)),
-            self._expected(command, pressures, state, known),
-        )
+        found = program(self.given(command, pressures, state))
+        expected = self.expected(command, pressures, state, known)
+        return self.compared(found, expected, command, pressures)
+
+    def compared(
+        self, found: Mapping[str, np.ndarray], expected: Mapping[str, np.ndarray], command: np.ndarray,
+        pressures: Pressures,
+    ) -> Tried:  # fmt: skip
+        """Compare what a program gave with what it must give."""
         shape = np.broadcast_shapes(command.shape, *(each.shape for each in pressures.values()))
         names = ["output_a", "output_b"][: len(self.laws)]
         differs = {name: np.broadcast_to(found[name] != expected[name], shape) for name in expected if name in found}
         wrong, first = np.logical_or.reduce([differs[name] for name in names]), ""
-        if wrong.any():
-            at = np.unravel_index(int(wrong.argmax()), shape)
-            name = next(name for name in names if differs[name][at])
+        if name := next((name for name, each in differs.items() if each.any()), ""):
+            at = np.unravel_index(int(differs[name].argmax()), shape)
             all_of = (command, found[name], expected[name], *pressures.values())
             asked, gave, must, *told = [int(np.broadcast_to(each, shape)[at]) for each in all_of]
-            first = f"command {asked}, pressures {' and '.join(map(str, told))}: {gave}, expected {must}"
+            first = f"command {asked}, pressures {' and '.join(map(str, told))}: {name} {gave}, expected {must}"
         digest = blake2b(digest_size=8)
         for name in names:
             digest.update(np.ascontiguousarray(np.broadcast_to(found[name], shape), dtype="<i4").tobytes())
@@ -261,40 +309,71 @@ class EveryPair:
             calls=wrong.size,
             wrong=int(wrong.sum()),
             wrong_status=counts["status"] + counts.get("beta", 0),
-            wrong_state=counts.get("side", 0) + counts.get("at_rest", 0),
+            wrong_state=sum(counts.get(name, 0) for name in ("side", "at_rest", *self.counts)),
             first_wrong=first,
             outputs_hash=digest.hexdigest(),
         )
 
-    def _expected(self, command: np.ndarray, pressures: Pressures, state: State, known: Known) -> dict[str, np.ndarray]:
+    def expected(
+        self, command: np.ndarray, pressures: Pressures, state: State, known: Known | None
+    ) -> dict[str, np.ndarray]:
         """Return what a program must give; without `known` only zero command can be asked for."""
-        side, rest = state
         first, last = self.laws[0].exact, self.laws[-1].exact
         sound = (command >= first.commands[0]) & (command <= first.commands[1])
-        away = np.where(sound, first.along * (command - first.command_zero), 0)
+        asked = first.along * (command - first.command_zero)
+        followed, counts = self._followed(sound, asked, state) if self.cycles else (sound, {})
+        away = np.where(followed, asked, 0)
+        expected: dict[str, np.ndarray] = {}
+        negative = np.zeros_like(followed)
         if self.both:
-            side = np.where(away > first.leave_zero, 1, np.where(-away > last.leave_zero, -1, side))
-            side = np.where(sound, side, 0)
-        negative = (side < 0) if self.both else np.zeros_like(sound)
+            side = np.where(away > first.leave_zero, 1, np.where(-away > last.leave_zero, -1, state["side"]))
+            expected["side"] = np.where(followed, side, 0)
+            negative = expected["side"] < 0
         towards = np.clip(np.where(negative, -away, away), 0, np.where(negative, last.span, first.span))
         if self.rests:
             zero_band = np.where(negative, last.zero_band, first.zero_band)
             leave_zero = np.where(negative, last.leave_zero, first.leave_zero)
-            rest = (towards <= zero_band) | (rest & (towards <= leave_zero))
-            towards = np.where(rest, 0, towards)
-        driven = sound & (side != 0)
-        outputs, statuses, betas = [], [], []
-        for law in self.laws:
-            rows, status = law.rows(pressures)
-            if known is not None and known[0] is law:
-                value = known[1][towards[:, 0]]
-            else:
-                value = np.where(towards == 0, law.at_zero[rows], -1)  # never asked for
-            mine = driven & (negative == (law.exact.sign < 0)) if self.both else driven
-            outputs.append(np.where(mine, value, 0))
-            statuses.append(status)
-            betas.append(law.exact.shown_betas[rows])
+            expected["at_rest"] = (towards <= zero_band) | (state["at_rest"] & (towards <= leave_zero))
+            towards = np.where(expected["at_rest"], 0, towards)
+        driven = followed & ((expected["side"] != 0) if self.both else True)
+        rows, statuses, sounds = zip(*(law.rows(pressures) for law in self.laws), strict=True)
+        held = [row == len(law.table) - 1 for row, law in zip(rows, self.laws, strict=True)]
         status = np.where(negative, statuses[-1], statuses[0]) + ~sound
-        expected = {"output_a": outputs[0], "status": status, "beta": betas[0]}
-        expected |= {"output_b": outputs[1], "side": side} if self.both else {}
-        return expected | ({"at_rest": rest} if self.rests else {})
+        if self.cycles:
+            held, of_pressures = self._held(held, [~each for each in sounds], negative, state)
+            counts |= of_pressures
+            status = status + WAITING * ~followed + HELD * np.where(negative, held[-1], held[0])
+        for place, law in enumerate(self.laws):
+            if known is not None and place in known.outputs:
+                value = known.at(place, towards, held[place])
+            else:
+                value = np.where(towards == 0, law.at_zero[np.where(held[place], -1, rows[place])], -1)  # never asked
+            mine = driven & (negative == (law.exact.sign < 0)) if self.both else driven
+            expected["output_b" if place else "output_a"] = np.where(mine, value, 0)
+        return expected | counts | {"status": status, "beta": self.laws[0].exact.shown_betas[rows[0]]}
+
+    def _followed(
+        self, sound: np.ndarray, asked: np.ndarray, state: State
+    ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+        """Return whether a command is followed, and the count of good ones: the drive's memory of the command."""
+        memory, unwanted = FaultMemory(self.cycles, False, state["valid_commands"]), np.array(False)
+        ends = [law.exact.interlock for law in self.laws]
+        if self.interlock and ends[0] is not None and ends[-1] is not None:
+            zero = (asked <= ends[0]) & ((-asked <= ends[-1]) if self.both else True)
+            unwanted = ~state["enable"] | (~zero & ~memory.usable)
+        memory.take(fault=~sound, unwanted=unwanted)
+        return memory.usable, {"valid_commands": memory.sound}
+
+    def _held(
+        self, failed: Sequence[np.ndarray], unsound: Sequence[np.ndarray], negative: np.ndarray, state: State
+    ) -> tuple[list[np.ndarray], dict[str, np.ndarray]]:
+        """Return whether each side's pressures are not used, and their counts: the drive's memory of the pressures."""
+        faults = [np.where(negative, failed[-1], failed[0])]
+        if self.three:  # of the side that is not driven only the sensors count
+            drives = (~negative, negative)
+            faults = [np.where(own, *each) for own, each in zip(drives, zip(failed, unsound, strict=True), strict=True)]
+        memories = [FaultMemory(self.cycles, False, state[name]) for name in self.counts[1:]]
+        for memory, fault in zip(memories, faults, strict=True):
+            memory.take(fault=fault)
+        held = [~memories[min(place, len(memories) - 1)].usable for place in range(len(self.laws))]
+        return held, {name: memory.sound for name, memory in zip(self.counts[1:], memories, strict=True)}

@@ -12,7 +12,8 @@ from math import ceil, floor, lcm
 
 import numpy as np
 
-from dzdesign.core.errors import RequirementError
+from dzdesign.core.errors import InputError, RequirementError, quoted
+from dzdesign.core.units import parse_quantity
 from dzdesign.design.compensator import Compensator
 from dzdesign.verify.exhaustive.exact_law import BETA_UNIT, Betas, ExactLaw
 
@@ -34,6 +35,23 @@ class Sensor:
     zero: int
 
 
+def cycles_of(compensator: Compensator, cycle_time: str) -> int:
+    """Return how many cycles in a row the debounce time needs: the least that are not shorter; 0 without a cycle time.
+
+    A debounce that was asked for in samples is the time that the samples take.
+    """
+    if not cycle_time:
+        return 0
+    asked = (compensator.options or {}).get("fault_debounce", "")
+    needed_ns = Fraction(compensator.drive_functions.fault_samples * 10**9, compensator.signals.sample_Hz)
+    if asked and "sample" not in asked:
+        needed_ns = Fraction(round(parse_quantity(asked, "time", "--fault-debounce") * 1e9))
+    cycle_ns = round(parse_quantity(cycle_time, "time", "the manifest's cycle_time") * 1e9)
+    if cycle_ns <= 0:
+        raise InputError(f"the manifest's cycle_time is {quoted(cycle_time)}, expected more than zero")
+    return max(1, ceil(needed_ns / cycle_ns))
+
+
 class ExactBlock(ExactLaw):
     """The law of one side in the units of the block's inputs and output."""
 
@@ -42,6 +60,8 @@ class ExactBlock(ExactLaw):
         functions, command = compensator.drive_functions, compensator.signals.command
         self.of_codes = interface == "codes"
         self.leave_zero, self.unit = functions.leave_zero_codes, 4096
+        #: The interlock takes a command up to this, from zero on, for zero command; None without one.
+        self.interlock = functions.interlock_codes
         self.rounding, self.command_zero = HALF, command.zero_code
         self.commands = command.valid_codes
         #: Of every pressure input by name, and what a number ahead and one behind count in a difference.
@@ -66,6 +86,7 @@ class ExactBlock(ExactLaw):
         self.span, self.zero_band = PER_WHOLE, widened(self.zero_band)
         self.transition_end = self.zero_band + widened(transition)
         self.leave_zero = widened(self.leave_zero)
+        self.interlock = None if self.interlock is None else widened(self.interlock)
         self.compare_limit = floor(Fraction(self.compare_limit, self.compare_max) * PER_WHOLE)
         self.compare_max = PER_WHOLE
         signals = self.compensator.signals

@@ -35,8 +35,9 @@ from dzdesign.verify.exhaustive.zero_command import (
     margins_of_drives,
     pressure_drops,
 )
+from dzdesign.verify.outputs.every_cycle import check_cycles
 from dzdesign.verify.outputs.every_pair import EveryPair, Program, Tried
-from dzdesign.verify.outputs.exact_block import ExactBlock, PER_MPa
+from dzdesign.verify.outputs.exact_block import ExactBlock, PER_MPa, cycles_of
 from dzdesign.verify.outputs.text_values import Overflow, TextValues
 from dzdesign.verify.requirements import EXACT_LAW, FALLBACK, OVERFLOW, STATES, ZERO_COMMAND, Check
 from dzdesign.verify.toolchain.machines import run_child
@@ -44,8 +45,6 @@ from dzdesign.verify.toolchain.machines import run_child
 Say = Callable[[str], None]
 BLOCK, FUNCTIONS = "FB_DeadZone", {1: "dz_comp", -1: "dz_comp_negative"}
 INTERFACES = ("plc", "codes")
-#: What a function block remembers of a new instance.
-FIRST = {"side": "0", "at_rest": "TRUE"}
 #: Files that hold the block for a tool, and their elements with its text; PLCopen's has its values once more.
 IMPORTED, TEXT_OF_BLOCK = (".xml", ".TcPOU"), ("}xhtml", "Declaration", "ST")
 NAMESPACE = "{http://www.plcopen.org/xml/tc6_0200}"
@@ -70,14 +69,17 @@ def block_checks(folder: Path, manifest: OutputManifest, compensator: Compensato
             "output again with `dzdesign codegen`"
         )
     say("comparing every input of the function block with the exact law")
-    every = EveryPair(compensator, interface, compensator.signals.signs, remembers=True)
+    cycles = cycles_of(compensator, manifest.settings.get("cycle_time", ""))
+    every = EveryPair(compensator, interface, compensator.signals.signs, remembers=True, cycles=cycles)
     content = read_bytes(folder / name, "text of the law").decode("ascii", "replace")
     try:
         text = TextValues(content, name)
-        if text.first != {name: value for name, value in FIRST.items() if name in text.first}:
-            raise RequirementError(f"{name} does not begin at rest: {text.first}")
+        first = {each: str(value).upper() for each, value in every.first().items()}
+        if text.first != first:
+            raise RequirementError(f"{name} begins with {text.first}, expected {first}")
         _check_imported(folder, content, text)
         found = every_input_of(text.run, every, name)
+        counted = [_named(check_cycles(text.run, every), name)] if cycles else []
     except Overflow as error:
         return OutputChecks(checks=(_named(OVERFLOW.check(holds=False, text=str(error)), name),))
     except RequirementError as error:
@@ -85,7 +87,7 @@ def block_checks(folder: Path, manifest: OutputManifest, compensator: Compensato
     fits = f"{len(text.lines)} assignments evaluated as they are written, 0 results beyond their DINT"
     overflow = _named(OVERFLOW.check(holds=True, text=fits), name)
     zero = [_zero_command(text.run, every, place, name) for place in range(len(every.laws))]
-    return replace(found, checks=(*found.checks, overflow, *zero))
+    return replace(found, checks=(*found.checks, *counted, overflow, *zero))
 
 
 def _check_imported(folder: Path, content: str, text: TextValues) -> None:

@@ -63,7 +63,7 @@ OF_FMUS = (
 OF_AMPLIFIERS = (requirements.READ_BACK, requirements.SAFE, requirements.DEAD_ZONES)
 #: Target, as the manifest names it, to what its checks are of, and the checks.
 KINDS = {
-    "iec61131": ((*OF_TEXTS, requirements.OVERFLOW), texts.block_checks),
+    "iec61131": ((*OF_TEXTS, requirements.DEBOUNCE, requirements.OVERFLOW), texts.block_checks),
     "fmu": ((requirements.FMU_VALID, *requirements.OF_INPUTS, *OF_FMUS), fmu.checks),
     "matlab": ((*OF_TEXTS, *requirements.OF_INPUTS), texts.function_checks),
     "amplifier": (OF_AMPLIFIERS, amplifier.checks),
