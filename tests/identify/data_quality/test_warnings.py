@@ -291,6 +291,16 @@ class TestStuckPressure:
     def test_a_repeated_test_is_welcome(self):
         assert not warned(identify(self.stuck((1.0, 1.0, 1.0))), "flow-contradicts-dp")
 
+    def test_where_the_mixture_is_refused_the_sensor_is_named(self, monkeypatch, wording):
+        def refuse(*_):
+            raise InputError("the flow jumps")
+
+        monkeypatch.setattr("dzdesign.identify.identification.identify_side", refuse)
+        with pytest.raises(InputError, match="it may be that"):  # and then the warning, as it is
+            identify(self.stuck(PRESSURES))
+        with wording.refusal(InputError):
+            identify([valve_at(dp) for dp in PRESSURES])
+
 
 class TestCoarseFlow:
     @staticmethod
