@@ -13,18 +13,18 @@ from tests.support.paths import ROOT
 ROOM_SIZES = {
     "core": (2510, 15, 0),
     "derivation": (4704, 28, 326),
-    "identify": (16184, 93, 1052),
+    "identify": (15684, 90, 986),
     "assess": (1577, 8, 0),
-    "design": (7232, 31, 0),
-    "codegen": (7786, 50, 7929),
-    "verify": (12029, 63, 4630),
+    "design": (7247, 31, 0),
+    "codegen": (7980, 50, 7929),
+    "verify": (12261, 64, 4630),
     "report": (4403, 20, 517),
-    "dzdesign": (9206, 62, 173),
+    "dzdesign": (9303, 62, 181),
 }
 #: Lines of Python of what is not shipped, and of the files that the tests compare with.
-TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 46289, 14570, 8554
+TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 46339, 14591, 8554
 #: Options of all commands together; an option of two commands counts twice.
-OPTIONS = 171
+OPTIONS = 172
 #: What a number may be above what is there, before it is to be lowered.
 SLACK = 0.02
 TEXTS = {".jinja", ".c", ".h", ".m", ".ld", ".toml", ".html", ".css", ".js", ".svg", ".md", ".txt"}
