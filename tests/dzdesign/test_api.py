@@ -223,7 +223,7 @@ def test_print_sums_a_result_up(example_valve, example_compensator, example_firm
     for outside in ("below 0.50 MPa", "above 5.00 MPa"):
         assert f"note: {outside} the offset" in str(example_compensator)
     assert str(example_compensator).startswith("Compensator for f28335, law paper, of a valve of 10 V\n")
-    assert "core/dz_comp.c" in str(example_firmware)
+    assert "core/: dz_valve.h" in str(example_firmware)
     for result in (example_valve, example_compensator, example_firmware):
         assert repr([result]) == f"[<{str(result).splitlines()[0]}>]"
         assert len(str(result)) < 4000
