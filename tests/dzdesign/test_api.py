@@ -310,7 +310,7 @@ def test_the_notebook_gives_what_it_shows(tmp_path, request):
     assert [cell["execution_count"] for cell in cells] == list(range(1, len(cells) + 1))
     shown = [Page("".join(each[-1]["data"]["text/html"])).text for each in found if "text/html" in each[-1]["data"]]
     assert len(shown) == 4 and "Every requirement holds" in shown[3]
-    assert "27250688 inputs checked, 0 wrong" in shown[3] and "core/dz_comp.c" in shown[2]
+    assert "27250688 inputs checked, 0 wrong" in shown[3] and "core/: dz_valve.h" in shown[2]
 
 
 RIGHT = """\
