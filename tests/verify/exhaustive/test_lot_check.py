@@ -176,8 +176,14 @@ def test_verify_compares_the_core_with_every_valve(common, tmp_path, wording):
     (check,) = lot_checked((found,), compensator)
     assert check.holds and found.holds and found.lot.valves == 4 and found.lot.over_compensated == ()
     wording.of_test(check.text)
-    assert found.lot.worst == common.worst.name  # two arguments agree, but for the rounding of one count
-    assert abs(found.lot.smallest_margin_V - float(common.worst.margin_V)) <= 10 / 60000
+    # Two arguments agree but for the rounding of one count; and the design takes the error of the pressures as whole
+    # codes, up to one more, over which the bound changes.
+    assert found.lot.worst == common.worst.name
+    worst, dp_MPa = compensator.lot[[*KNEES].index(common.worst.name)].positive, compensator.signals.pair(1).dp_MPa
+    slopes = np.diff(worst.u_lower_V) / np.diff(worst.dp_MPa)
+    of_a_code_V = float(np.abs(slopes).max()) * float(dp_MPa(1) - dp_MPa(0))
+    more_V = found.lot.smallest_margin_V - float(common.worst.margin_V)
+    assert -10 / 60000 <= more_V <= 10 / 60000 + of_a_code_V
     lower, compensator = firmware_of(with_bound(common.compensator, "d", 0, -0.5), tmp_path / "lower")
     found = check_all_inputs(lower)
     (check,) = lot_checked((found,), compensator)
