@@ -22,7 +22,7 @@ ROOM_SIZES = {
     "dzdesign": (9303, 62, 181),
 }
 #: Lines of Python of what is not shipped, and of the files that the tests compare with.
-TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 46339, 14591, 8554
+TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 46345, 14591, 8554
 #: Options of all commands together; an option of two commands counts twice.
 OPTIONS = 172
 #: What a number may be above what is there, before it is to be lowered.
